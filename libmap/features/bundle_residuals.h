@@ -1,4 +1,4 @@
-// Computes residuals of bundle adjustment and derivatives by poses, points and camera parameters.
+// Residuals of bundle adjustment, with derivatives by (with respect to) poses, points and cameras.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,51 +9,52 @@
 
 namespace libmap {
 
-// Residual fx (x/z - u), fy (y/z - v) (px) and z - depth (m) of a point (x, y, z) in the camera's
-// frame that was observed along the ray (u, v, 1), and derivative by the point. z must not be 0.
+// Residual of a point (x, y, z) (camera's optical frame, m) that was measured on the ray (u, v, 1)
+// at a depth d. z must not be 0.
 struct Projection {
-  Eigen::Vector3d residual;
-  Eigen::Matrix3d by_point;
+  Eigen::Vector3d residual;  // fx (x/z - u) px, fy (y/z - v) px, z - d m
+  Eigen::Matrix3d by_point;  // derivative by the point
 };
 Projection project(const Eigen::Vector3d& point, const Eigen::Vector2d& focal_px,
                    const Eigen::Vector2d& ray, double depth_m);
 
-// Effect of camera calibration on one observation, linearized at a known calibration.
+// Effect of camera calibration on one observation, linearized at a known calibration. The first
+// four fields are true if the camera's parameters of this kind are estimated.
 struct CalibratedObservation {
-  bool intrinsics = false;  // these four: true if the parameters are unknown
-  bool depth = false;
-  bool registration = false;
-  bool timing = false;
-  DepthCorrection::Terms terms{};          // of the depth correction at the feature
-  bool has_depth = true;                   // false: the depth is of another surface
+  bool intrinsics = false;                 // focal lengths and principal point
+  bool depth = false;                      // DepthCorrection
+  bool registration = false;               // pose of the depth camera relative to the color camera
+  bool timing = false;                     // CameraTiming
+  DepthCorrection::Terms terms{};          // basis values of the depth correction at the feature
+  bool has_depth = true;                   // false: the depth was measured on another surface
   double added_m = 0.0;                    // change of depth by the known registration and timing
   Vector6d by_step = Vector6d::Zero();     // derivative of the depth by a registration step
   Vector6d known_step = Vector6d::Zero();  // registration step that the known timing causes
-  double image_row_fraction = 0.0;         // row_fraction
+  double image_row_fraction = 0.0;         // row_fraction() of the feature (frame_calibration.h)
   double depth_stamp_offset_s = 0.0;       // FrameFeatures::depth_stamp_offset_s
 };
 
-// Indices of a camera's parameters: step of the intrinsics (4), step of the registration (6),
-// timing (2), radial terms of the depth correction (3), coefficients of the spline.
+// First index of each kind of parameter of a camera: step of the intrinsics (4), step of the
+// registration (6), timing (2), radial terms (3) and spline coefficients of the depth correction.
 inline constexpr Eigen::Index intrinsics_at = 0;
 inline constexpr Eigen::Index registration_at = 4;
 inline constexpr Eigen::Index timing_at = 10;
 inline constexpr Eigen::Index radial_at = 12;
 inline constexpr Eigen::Index spline_at = 15;
 
-// Residual (image x, image y, depth) in standard deviations, and derivatives.
+// Residual (image x, image y, depth) in standard deviations, and its derivatives.
 struct CalibratedResidual {
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, 3, 6> by_pose;    // by a step of the pose (rigid_motion.h)
-  Eigen::Matrix<double, 3, 6> by_motion;  // set with timing only
-  Eigen::Matrix3d by_point;
-  Eigen::Matrix<double, 3, spline_at> by_camera;  // 0 for known parameters
-  Eigen::RowVector4d depth_by_spline;  // by the coefficients from spline_at + terms.first on
+  Eigen::Matrix<double, 3, 6> by_motion;  // by the base's velocity; set only if timing is estimated
+  Eigen::Matrix3d by_point;               // by the point in the map frame
+  Eigen::Matrix<double, 3, spline_at> by_camera;  // by the parameters before spline_at; 0 if known
+  Eigen::RowVector4d depth_by_spline;  // depth by four parameters from spline_at + terms.first on
 };
 
-// One observation of a point. Intrinsics parameters are steps from the intrinsics that determined
-// the feature's ray: relative for fx and fy, in pixels for cx and cy. Registration parameters are a
-// step from the known registration.
+// One observation of a point. The parameters of the intrinsics are steps from the intrinsics that
+// determined the feature's ray: relative for fx and fy, in pixels for cx and cy. The parameters of
+// the registration are a step from the known registration.
 class CalibratedFeature {
  public:
   CalibratedFeature(const Feature& feature, const Camera& camera,

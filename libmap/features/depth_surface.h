@@ -1,4 +1,4 @@
-// Downsamples a depth image to a grid of small planes, which can be looked up by rays.
+// Downsamples a depth image to a grid of small planes, and looks up planes at projected points.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,7 @@
 
 namespace libmap {
 
-// Plane at one element of the grid, in the camera's optical frame (m).
+// Plane at one position of the grid, in the camera's optical frame (m).
 struct SurfacePatch {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit, towards the camera
@@ -24,9 +24,9 @@ struct SurfacePatch {
 
 class DepthSurface {
  public:
-  // One element in 10 bytes. The cells of all frames dominate the memory of a long scan.
+  // A SurfacePatch in 10 bytes, because cells need most of the memory of a long scan.
   struct Cell {
-    std::array<std::uint16_t, 2> depth_bits{};  // bits of a float, m; 0: no measurement
+    std::array<std::uint16_t, 2> depth_bits{};  // depth as float, m; 0: no measurement
     std::int16_t normal_x = 0;                  // unit normal, in units of 1/32767
     std::int16_t normal_y = 0;
     std::uint16_t noise = 0;  // in units of 1e-6 m
@@ -38,33 +38,31 @@ class DepthSurface {
   };
 
   DepthSurface() = default;
-  // Takes every step_px-th pixel of `planes`. Drops planes, for example at edges, whose support is
-  // less than a quarter of the largest support in the image.
+  // Takes every step_px-th pixel of `planes`. Drops planes that were fitted to few pixels, for
+  // example at edges: less than a quarter of the maximum. surface_noise_m: as in FeatureOptions.
   DepthSurface(const DepthPlanes& planes, const Camera& depth_camera, const DepthNoise& noise,
                double surface_noise_m, int step_px);
-  // Restores a stored surface. Throws Error unless there is one cell per step_px-th pixel.
+  // Restores a stored surface. Throws Error if the number of cells differs from columns() * rows().
   DepthSurface(const Camera& depth_camera, int step_px, std::vector<Cell> cells);
 
   const Camera& camera() const { return camera_; }
-  // Replaces the camera by a camera of the same size and distortion. Depths of pixels are kept, and
-  // normals are recomputed.
+  // Sets a camera of equal image size and distortion. Keeps all depths, and recomputes normals.
   void set_camera(const Camera& depth_camera);
   // Rescales the noise from the depth noise model `before` to `after`.
   void set_noise(const DepthNoise& before, const DepthNoise& after);
-  // Applies the correction to the depths and recomputes the normals. Drops elements without a
-  // positive depth.
+  // Applies the correction to the depths and recomputes the normals. Drops planes with depths <= 0.
   void correct(const DepthCorrection& correction);
   int step_px() const { return step_px_; }
   const std::vector<Cell>& cells() const { return cells_; }
   int columns() const { return columns_; }
   int rows() const { return rows_; }
-  // The lookups set `element` (optical frame), or return false if nothing was measured there. at()
-  // looks up a grid position, which must be inside the grid.
+  // Looks up a grid position, which must be inside the grid. This function and the next two set
+  // `element` (optical frame), or return false without a measurement at the point's pixel.
   bool at(int column, int row, SurfacePatch& element) const;
-  // Looks up the element nearest to the projection of `point_in_camera` (optical frame).
+  // Looks up the grid position nearest to the projection of `point_in_camera` (optical frame).
   bool nearest_to(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
   // Looks up the surface on the point's ray: the bilinear mean of the four neighboring planes if
-  // they are on one surface, otherwise the nearest plane.
+  // their depths on the ray differ by less than 3 %, otherwise the nearest plane.
   bool interpolated_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
 
  private:

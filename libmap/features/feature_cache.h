@@ -12,26 +12,26 @@
 namespace libmap {
 
 // Returns the SHA-256 of the frame's images and cameras, the options and the format version. Equal
-// keys mean equal features, independent of the file that contains the frame.
+// keys mean equal features, even if the frames are in different scan files.
 std::string feature_key(const RgbdFrame& frame, const FeatureOptions& options);
 
-// Safe for use by several threads and processes at once. A file contains one line with the SHA-256
-// of the rest, followed by CBOR (RFC 8949). Files are written atomically.
+// Safe for use by several threads and processes at once. A file is written atomically. It contains
+// one line with the SHA-256 of the bytes after this line, which are CBOR (RFC 8949).
 class FeatureCache {
  public:
-  FeatureCache() = default;  // disabled
+  FeatureCache() = default;  // disabled: read() and write() return false
   // The folder is created when the first frame is stored; the parent folder must exist.
   explicit FeatureCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   bool enabled() const { return !folder_.empty(); }
   // Reads features, descriptors and surfaces into `frame`, whose `type` must be set;
-  // `depth_cameras` has one camera per surface. Returns false and leaves `frame` unchanged if the
-  // key has no valid file.
+  // `depth_cameras` has one camera per surface. Returns false and leaves `frame` unchanged if there
+  // is no valid file for `key`.
   bool read(const std::string& key, const std::vector<Camera>& depth_cameras,
             FrameFeatures& frame) const;
-  // Returns a temporary file in the folder; nullptr if disabled or the file cannot be created.
+  // Creates a file for FrameFeatures::descriptor_file; nullptr if disabled or this fails.
   std::shared_ptr<TempFile> temp_file() const;
-  // Stores the frame. Returns false, without an error, if the file cannot be written.
+  // Stores the frame. Returns false, without an error, if disabled or the file cannot be written.
   bool write(const std::string& key, const FrameFeatures& frame) const;
 
  private:

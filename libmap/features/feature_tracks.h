@@ -1,5 +1,5 @@
-// Finds matches between pairs of frames, verified by a rigid motion, and joins them into tracks. A
-// track contains the observations of one point in several frames.
+// Finds feature matches between pairs of frames, which are verified by a rigid motion, and joins
+// the matches into tracks. A track contains the observations of one point in several frames.
 #pragma once
 
 #include <cstddef>
@@ -16,9 +16,9 @@ namespace libmap {
 
 // Options for matching the features of two frames.
 struct MatchingOptions {
-  double max_ratio = 0.8;  // > 0: see match_features
+  double max_ratio = 0.8;  // > 0: maximum distance ratio of nearest to second nearest descriptor
   int held_out = 10;       // >= 2: one in this many features is used for evaluation only
-  RelativePoseOptions estimate{};
+  RelativePoseOptions estimate{};  // relative pose of the frames
 };
 
 // Indices of two frames in the list of frames; first < second.
@@ -28,20 +28,20 @@ using FramePair = std::pair<std::size_t, std::size_t>;
 struct FeatureLink {
   FramePair frames;
   PoseLink link{};                       // between the nodes of the frames
-  std::vector<FeatureMatch> matches{};   // inliers of the estimate; a is in the frame of link.from
+  std::vector<FeatureMatch> matches{};   // inliers; a is in frames.first, b in frames.second
   std::vector<FeatureMatch> held_out{};  // consistent matches that the estimate did not use
-  double chi_square_per_freedom = 0.0;   // of the inliers
+  double chi_square_per_freedom = 0.0;   // chi-square of the inliers per degree of freedom
 };
 
-// Numbers of pairs of frames by outcome.
+// Number of pairs of frames by outcome.
 struct RejectionCounts {
-  std::size_t candidates = 0;
+  std::size_t candidates = 0;  // all pairs
   std::size_t too_few_matches = 0;
   std::size_t too_few_inliers = 0;
   std::size_t degenerate = 0;  // inliers in one spot or on one line of the image
   std::size_t not_converged = 0;
-  std::size_t against_graph = 0;  // not consistent with the graph's estimate and covariance
-  std::size_t unconfirmed = 0;    // the only link between two components of the graph
+  std::size_t against_graph = 0;  // not consistent with the pose graph's estimate and covariance
+  std::size_t unconfirmed = 0;    // the only link between two components of the pose graph
   std::size_t accepted = 0;
 };
 
@@ -50,19 +50,19 @@ struct PairVerification {
   RejectionCounts counts;
 };
 
-// Matches by pair of frames, which depend on the descriptors, not on the cameras.
+// Matches by pair of frames. Matches depend on the descriptors, not on the camera calibration.
 using KnownMatches = std::map<FramePair, std::vector<FeatureMatch>>;
 
 // Matches the features of each pair and estimates the relative pose; a pair without a valid
-// estimate has no link. Pairs in `known` are not matched again; matches of other pairs are added.
-// Throws Error if descriptors cannot be read from the temporary file.
+// estimate has no link. For pairs in `known`, the known matches are used; the matches of the other
+// pairs are added to `known`. Throws Error if a descriptor file cannot be read.
 PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
                               const std::vector<FramePair>& pairs, const MatchingOptions& options,
                               std::uint64_t seed, Progress& progress = no_progress(),
                               KnownMatches* known = nullptr);
 
 // Returns an initial guess of first_from_second for a pair, from as few as six consistent matches;
-// nullopt if there are fewer. Throws Error as verify_pairs does.
+// nullopt if the estimation fails. Throws Error as verify_pairs does.
 std::optional<Pose> guess_motion(const std::vector<FrameFeatures>& frames, const FramePair& pair,
                                  const MatchingOptions& options, std::uint64_t seed);
 
@@ -83,8 +83,8 @@ struct FeatureTracks {
   std::size_t split = 0;             // dropped matches: a track would join frames without a link
 };
 
-// linked: all frames of a track are linked pairwise, and a point with many observations becomes
-// several tracks. The normal equations of such tracks are as sparse as the graph of the links.
+// Frames that a track may join. linked: every two frames of a track have a link. A point with many
+// observations then becomes several tracks, and normal equations are as sparse as the links.
 enum class TrackFrames { any, linked };
 
 // Joins matches into tracks by union-find, in ascending order of chi-square. Drops a match that

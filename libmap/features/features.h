@@ -30,15 +30,15 @@ std::size_t descriptor_bytes(FeatureType type);
 struct FeatureOptions {
   FeatureType type = FeatureType::sift;
   int max_features = 800;         // >= 1: maximum per image; the strongest are kept
-  double min_contrast = 0.02;     // > 0: minimum for SIFT, image values from 0 to 1
-  double pixel_noise_px = 0.15;   // > 0: standard deviation of position at the finest scale
-  double scale_noise = 0.06;      // >= 0: standard deviation per pixel of size, in quadrature
+  double min_contrast = 0.02;     // > 0: minimum contrast for SIFT, image values from 0 to 1
+  double pixel_noise_px = 0.15;   // > 0: standard deviation of image position at the finest scale
+  double scale_noise = 0.06;      // >= 0: pixel noise per px of feature size, added in quadrature
   double surface_noise_m = 5e-4;  // >= 0: standard deviation of depth, not reduced by averaging
   int surface_step_px = 3;        // 1 to 32: minimum step of the grid of planes
-  DepthPlaneOptions planes{};     // planes of the depth images
-  // The following fields are no parameters of commands.
+  DepthPlaneOptions planes{};     // fit of planes to the depth images, with depth range and noise
+  // The following fields have no command option.
   bool surfaces_only = false;  // true: color is not read, and frames have no features
-  // Limit for the memory of the surfaces of all frames, for long scans.
+  // Maximum memory of the surfaces of all frames, bytes; surface_step_px is increased if necessary.
   std::size_t max_surface_bytes = std::size_t{256} << 20U;
   std::size_t max_frames_in_memory = 300;  // with more, descriptors are stored on disk
 };
@@ -54,17 +54,17 @@ struct Feature {
   float depth_m = 0.0F;                           // depth of the plane at the pixel, > 0
   float depth_noise_m = 0.0F;                     // standard deviation of depth_m
   float pixel_noise_px = 0.0F;                    // standard deviation of the image position
-  std::uint16_t camera = 0;                       // index of the camera
+  std::uint16_t camera = 0;                       // index in FrameFeatures::cameras
 };
 
 struct FrameFeatures {
   int node = 0;
   double stamp_s = 0.0;               // time of the color images
-  double depth_stamp_offset_s = 0.0;  // RgbdFrame::depth_stamp_offset_s
+  double depth_stamp_offset_s = 0.0;  // time of the depth images minus stamp_s
   std::vector<Camera> cameras;        // cameras of the color images
   std::vector<Feature> features;
   FeatureType type = FeatureType::sift;
-  // 128 (SIFT) or 32 (ORB) bytes per feature; may be dropped after the search for similar frames.
+  // 128 (SIFT) or 32 (ORB) bytes per feature; empty if dropped or stored in descriptor_file.
   std::vector<std::uint8_t> descriptors;
   std::shared_ptr<const TempFile> descriptor_file;  // if set, contains the descriptors
   std::uint64_t descriptors_begin = 0;              // byte offset in descriptor_file
@@ -91,7 +91,7 @@ FeatureResult find_features(const ScanSource& scan, const std::vector<int>& node
                             const FeatureOptions& options = {}, Progress& progress = no_progress(),
                             const FeatureCache* cache = nullptr);
 
-// Appends the features of one image to `frame`; the camera is the last one of frame.cameras.
+// Appends the features of one image to `frame`. The image is from the last of frame.cameras.
 void add_features(const CameraView& view, const DepthPlanes& planes, const FeatureOptions& options,
                   FrameFeatures& frame);
 

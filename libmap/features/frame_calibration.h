@@ -15,9 +15,9 @@ namespace libmap {
 
 // Change of a camera's intrinsics.
 struct IntrinsicsStep {
-  double fx_relative = 0.0;  // relative to fx
-  double fy_relative = 0.0;  // relative to fy
-  double cx_px = 0.0;
+  double fx_relative = 0.0;  // change of fx divided by fx
+  double fy_relative = 0.0;  // change of fy divided by fy
+  double cx_px = 0.0;        // change of cx
   double cy_px = 0.0;
 };
 
@@ -29,12 +29,11 @@ struct CameraTiming {
   double rolling_shutter_s = 0.0;  // time from the first to the last image row
 };
 
-// Differences from the stored calibration, one element per camera of the rig. An empty list means
-// no difference.
+// Differences from the stored calibration, one element per camera of the rig; empty: no difference.
 struct SensorCalibration {
   std::vector<IntrinsicsStep> intrinsics{};
   std::vector<DepthCorrection> depth{};
-  std::vector<Pose> color_from_depth{};  // true pose of the depth camera relative to the stored one
+  std::vector<Pose> color_from_depth{};  // pose of the true relative to the stored depth camera
   std::vector<CameraTiming> timing{};
   // Used only with `timing`: velocity of the base by node, in the base frame, m/s and rad/s.
   std::map<int, Vector6d> motion{};
@@ -58,32 +57,31 @@ Camera moved(Camera camera, const IntrinsicsStep& step);
 
 // Returns the squared distance of a feature from the image center, 1 at the corner pixels.
 double squared_radius_of(const Feature& feature, const Camera& camera);
-// Returns a feature's row from -0.5 (first row) to 0.5 (last row), which is exposed this share of
-// CameraTiming::rolling_shutter_s after the middle row.
+// Returns the fraction f of a feature's image row, from -0.5 (first row) to 0.5 (last row). The row
+// is exposed f * CameraTiming::rolling_shutter_s after the middle row.
 double row_fraction(const Feature& feature, const Camera& camera);
 
-// Converts a velocity of the base (base frame) to the velocity of the camera (optical frame).
+// Converts the velocity of the base (base frame, m/s and rad/s) to the camera's (optical frame).
 Vector6d motion_in_camera(const Camera& camera, const Vector6d& base_motion);
 // Returns the depth camera's pose relative to the color camera at the exposure of the feature.
 Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
                          const SensorCalibration& calibration);
 
-// Change of a feature's depth if the depth camera is at `color_from_depth` instead of the stored
-// registration, and the derivative by the step s in moved(Pose::Identity(), s) * color_from_depth
-// (rigid_motion.h). If no plane contains the feature, `known` is false and the values are 0: the
-// depth was measured on another surface.
+// Change of a feature's depth if the depth camera is at `color_from_depth` instead of its stored
+// pose relative to the color camera.
 struct RegisteredDepth {
-  bool known = false;
-  double added_m = 0.0;
+  bool known = false;    // false, and values 0: the depth was measured on another surface
+  double added_m = 0.0;  // change of the depth
+  // Derivative of the depth by s in moved(Pose::Identity(), s) * color_from_depth (rigid_motion.h).
   Vector6d by_step = Vector6d::Zero();
 };
-inline constexpr float unknown_depth_m = 1.0F;  // standard deviation of an unknown depth
+inline constexpr float unknown_depth_m = 1.0F;  // standard deviation of an unknown depth, m
 RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feature,
                                  const Pose& color_from_depth);
-// Returns true if a plane is at the feature with the stored registration; false at edges.
+// Returns true if the feature is on a plane of the depth image as stored; false at depth edges.
 bool has_plane(const FrameFeatures& frame, const Feature& feature);
 
-// Returns true if both splines have equal knots, so that coefficients can be exchanged.
+// Returns true if the splines of a and b have equal knots, so that coefficients can be exchanged.
 bool has_same_knots(const DepthCorrection& a, const DepthCorrection& b);
 
 // Returns zero corrections, one per camera. The knots cover the depths of the camera's features

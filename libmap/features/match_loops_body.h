@@ -1,4 +1,5 @@
-// Implements match_loops.h; included by match_loops.cc once per instruction set.
+// Implements match_loops.h; included by match_loops.cc once per instruction set, whose vector
+// registers have GRASPMAP_REGISTER bytes.
 
 constexpr int width = GRASPMAP_REGISTER / static_cast<int>(sizeof(float));
 
@@ -17,7 +18,7 @@ inline void store(const Vector& vector, Value* to) {
   __builtin_memcpy(to, &vector, sizeof(Vector));
 }
 
-// Largest and second largest product in each lane.
+// Largest and second largest product in each lane, and the index of the largest.
 struct Largest {
   Floats first;
   Floats second;

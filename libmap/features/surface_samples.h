@@ -8,7 +8,7 @@
 
 namespace libmap {
 
-// Plane element in the base frame (m).
+// Small plane of a DepthSurface, in the base frame (m).
 struct PlacedElement {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit, towards the camera
@@ -16,14 +16,14 @@ struct PlacedElement {
   double range_m = 0.0;                              // depth along the optical axis
 };
 
-// One in ten patches of each depth image is held out for checks and never used for estimation.
+// One in ten patches (6 x 6 grid cells) of each depth image is only for checks, not for estimation.
 enum class SampleUse { estimation, checks };
 
-// Returns about `count` elements, evenly distributed over the images.
+// Returns about `count` planes, evenly distributed over the frame's images.
 std::vector<PlacedElement> surface_samples(const FrameFeatures& frame, int count, SampleUse use);
 
-// Finds the element at the projection of the point, in the first camera that has an element at this
-// pixel. Returns false if no camera has one.
+// Finds the plane at the projection of the point, in the first camera that has a plane there.
+// Returns false if no camera has a plane there.
 bool element_at(const FrameFeatures& frame, const Eigen::Vector3d& point_in_base,
                 PlacedElement& element);
 

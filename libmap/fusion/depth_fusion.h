@@ -1,14 +1,14 @@
-// Fuses all depth images of a scan into one oriented, colored cloud.
-//
-// Frames are first registered to each other (frame_registration), by surface elements in random
-// blocks of the x-y plane. Two passes over the frames follow. The first fits a plane to the pixels
-// around each pixel (depth_planes) and averages positions and normals in a hashed voxel grid
-// (surface_voxels): a coarse surface, one element per column of voxels and surface. The second
-// moves each element along the normal to the weighted mean of the measurements of all frames within
-// a disc around it (surface_refinement). Both passes average the intersections of rays with the
-// surface instead of the noisy points, which makes the means unbiased. Memory is proportional to
-// the occupied voxels of a tile. Up to 256 MB of decoded depth is cached (300 frames of 512 x 424);
-// other frames are decoded once per pass.
+// Fuses all depth images of a scan into one oriented, colored cloud, in four steps:
+// 1. frame_registration moves frames so that the surfaces agree in random blocks of the x-y plane.
+// 2. First pass over the frames: depth_planes fits a plane to the pixels around each pixel, and
+//    surface_voxels averages positions and normals in a hashed voxel grid. The result is a coarse
+//    surface of surface elements (points with normals), one per column of voxels and surface.
+// 3. Second pass: surface_refinement moves each element along its normal to the weighted mean of
+//    the measurements of all frames within a disc around the element.
+// 4. surface_points converts the elements to a cloud.
+// Both passes average intersections of rays with the surface instead of noisy points, so the means
+// are unbiased. Memory is proportional to the occupied voxels of a tile. Up to 256 MB of decoded
+// depth is cached (300 frames of 512 x 424); other frames are decoded once per pass.
 #pragma once
 
 #include <cstddef>
@@ -33,21 +33,21 @@
 namespace libmap {
 
 struct DepthFusionOptions {
-  double voxel_size_m = 0.01;  // > 0
-  // Depth camera: a name in data/sensors or a path, whose depth range and noise replace default
-  // values. "auto": the noise of `planes`, which choose_noise (libmap/refine) estimates.
+  double voxel_size_m = 0.01;  // > 0: edge length of a voxel
+  // Depth camera: a name in data/sensors or a path. Its depth range and noise replace default
+  // values of `planes`. "auto": `planes` is used unchanged.
   std::string sensor = "auto";
   DepthPlaneOptions planes{};
   double disc_radius_voxels = 1.5;  // > 0: radius of the discs in which measurements are averaged
-  // >= 0: standard deviation of a frame along a normal; prevents the nearest frame from dominating.
+  // >= 0: standard deviation of a frame's position along the normal, due to pose errors. A value
+  // above 0 prevents the nearest frame from dominating the mean.
   double pose_error_m = 0.0;
-  // >= 0: maximum number of rounds of registration (frame_registration) before fusion; 0: the poses
-  // are used unchanged.
+  // >= 0: maximum number of rounds of registration before fusion; 0: poses are used unchanged.
   int registration_rounds = 3;
-  // The poses were already refined with depth and color, so only color can confirm a registration.
+  // true: poses are already refined with depth and color, so only color can confirm a registration.
   bool refined_poses = false;
-  // >= 0: skips frames that add less than 1/enough_views to the information of earlier frames on
-  // nearly all of the frame's surface; 0: all frames are fused.
+  // >= 0: skips a frame that adds less than 1/enough_views to the information (inverse variance) of
+  // earlier frames on nearly all of the frame's surface; 0: fuses all frames.
   double enough_views = 10.0;
   SurfacePointOptions points{};
   // Adds points one voxel beyond measured edges, unless views see through these points.
@@ -61,21 +61,22 @@ void bind(ParameterTable& table, DepthFusionOptions& options);
 // Counts for one tile, or sums over several.
 struct FusionCounts {
   DepthPixelCounts pixels;          // each frame is counted in one tile only
-  std::size_t occupied_voxels = 0;  // with measurements
+  std::size_t occupied_voxels = 0;  // voxels with measurements
   std::size_t elements = 0;         // surface elements, before points are selected
   SurfacePointCounts points;
   std::size_t output_points = 0;  // points of the cloud
 };
 void describe(ResultTable& table, const FusionCounts& counts);
 
-// Mean costs of depth or color with the poses before and after a registration.
+// Mean costs of pairs of overlapping frames with the poses before and after a registration. Cost of
+// depth: log(1 + chi-square / 9). Cost of color: 1 - correlation of the brightness of patches.
 struct PairCosts {
-  std::size_t count = 0;
+  std::size_t count = 0;  // number of compared pixels
   double before = 0.0;
   double after = 0.0;
-  double deviation = 0.0;  // standard error of after - before, from the scatter of pairs
+  double deviation = 0.0;  // standard error of after - before, from the scatter of the pairs
 
-  // Both return true if the difference exceeds two standard errors and half a percent.
+  // Both return true if the difference exceeds two standard errors and half a percent of `before`.
   bool is_clearly_worse() const;
   bool is_clearly_better() const;
 };
@@ -84,37 +85,38 @@ struct RegistrationCheck {
   PairCosts depth;  // in held-out blocks of the x-y plane
   PairCosts color;  // everywhere, because registration uses depth only
 
-  // Returns true if neither is clearly worse and both together are better. For refined poses, which
-  // already use depth, color must be clearly better.
+  // Returns true if neither depth nor color is clearly worse, and the sum of both improvements, in
+  // standard errors, is above 0. For refined poses, color must be clearly better instead.
   bool is_accepted(bool refined_poses) const;
 };
 
 // Result of the first step: usable frames with registered poses, common to all tiles.
 struct FusionPlan {
-  // World position of the voxel grid's origin, near the first camera. Relative to it, single
-  // precision is enough for scans at any offset.
+  // World position of the voxel grid's origin, near the first pose. Positions relative to the
+  // origin can be in single precision, even far from the world's origin.
   Eigen::Vector3d grid_origin = Eigen::Vector3d::Zero();
   std::vector<FusionFrame> frames;               // by ascending node
   std::vector<std::pair<int, Error>> skipped{};  // nodes of unusable frames, with the reason
   std::vector<int> redundant{};                  // nodes of frames without new information
   int registration_rounds = 0;                   // rounds that moved frames; 0: poses are unchanged
-  bool registration_rejected = false;      // first round rejected, or refined poses without color
+  // true: the first round was rejected, or poses are refined and there is no color to check them.
+  bool registration_rejected = false;
   RegistrationCheck registration_check{};  // of the first round
-  // RMS deviation of single frames' heights from the mean height, with given and final poses.
+  // RMS deviation of frames' surface heights from the mean height, with given and final poses.
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;
   DepthNoise noise{};  // depth noise that all passes assume
 };
 
 struct DepthFusionResult : FusionCounts {
-  // World frame; unit normals towards the cameras; colors if any frame has them. Fields: `views`,
+  // World frame; unit normals towards the cameras; colors if any frame has color. Fields: `views`,
   // number of distinct frames; `expected_error`, standard deviation of the position along the
-  // normal, m. `expected_error` includes noise, disagreement of frames, and the difference between
-  // both passes, which is large where the surface is curved within a disc.
+  // normal, m. It includes noise, disagreement of frames, and half the shift in the second pass,
+  // which is large where the surface is curved within a disc.
   PointCloud cloud;
-  std::size_t frames = 0;  // number of fused frames
-  std::size_t redundant_frames = 0;
-  // Registered poses of used and redundant frames, world from base, by ascending node.
+  std::size_t frames = 0;            // number of fused frames
+  std::size_t redundant_frames = 0;  // number of frames skipped by `enough_views`
+  // Registered poses of fused and redundant frames, world from base, by ascending node.
   Trajectory poses;
   // As in FusionPlan; shift and turn are root mean squares over the frames.
   int registration_rounds = 0;
@@ -131,9 +133,9 @@ struct DepthFusionResult : FusionCounts {
 void describe(ResultTable& table, const DepthFusionResult& result);
 
 // Fuses the frames of `world_from_base` that have depth. The output bytes do not depend on the
-// number of threads. Frames without depth, without a finite pose or that cannot be decoded are
-// skipped and listed. Throws Error if an option is out of range, no frame is usable, or poses are
-// too far apart for the voxel size (2^20 voxels).
+// number of threads. Frames that have no depth or no finite pose, or that cannot be decoded, are
+// skipped and listed, or with `strict` throw Error. Throws Error if an option is out of range, no
+// frame is usable, or poses are too far apart for the voxel size (2^20 voxels).
 DepthFusionResult fuse_depth(const ScanSource& scan, const Trajectory& world_from_base,
                              const DepthFusionOptions& options = {},
                              Progress& progress = no_progress());
@@ -146,21 +148,22 @@ inline constexpr double whole_plan = std::numeric_limits<double>::infinity();
 // identical, bit for bit, to the point without tiles.
 class TileFusion {
  public:
-  // Selects and registers frames, or uses the earlier result `known`. `scan` and `progress` must
-  // outlive this object. Throws as fuse_depth does, and if poses are too far from the origin.
+  // Selects and registers frames, or uses `known`, the plan() of another TileFusion. `scan` and
+  // `progress` must outlive this object. Throws Error as fuse_depth does, and if poses are too far
+  // from the world's origin.
   TileFusion(const ScanSource& scan, const Trajectory& world_from_base,
              const DepthFusionOptions& options, double tile_m, Progress& progress = no_progress(),
              const FusionPlan* known = nullptr);
   ~TileFusion();
 
-  const FusionPlan& plan() const;            // for a later TileFusion
+  const FusionPlan& plan() const;            // plan of all tiles
   const std::vector<XyTile>& tiles() const;  // tiles with frames, in ascending order
   struct Tile {
     PointCloud cloud;
     FusionCounts counts;
   };
-  Tile make(std::size_t tile);  // an index in tiles()
-  // Returns the result without cloud and counts, with the times so far.
+  Tile make(std::size_t tile);  // fuses the tile with this index in tiles()
+  // Returns the result without cloud and counts, with the times until now.
   DepthFusionResult report() const;
 
  private:

@@ -18,8 +18,8 @@ struct DepthPlaneLoops {
   struct Limits {
     float min_depth_m;
     float max_depth_m;
-    float gate;  // standard deviations
-    float axial_m;
+    float gate;     // factor of `tolerance`, standard deviations
+    float axial_m;  // this and the next two: noise as in DepthNoise
     float axial_of_range;
     float axial_of_square;
   };
@@ -28,48 +28,47 @@ struct DepthPlaneLoops {
     int unmeasured;
     int out_of_range;
   };
-  // Computes each pixel's inverse depth (0 without depth within the limits) and its maximum
-  // difference from the mean of two opposite pixels.
+  // Computes each pixel's inverse depth (0 without depth within the limits) and `tolerance`, its
+  // maximum difference from the mean inverse depth of two opposite pixels.
   MeasureCounts (*measure)(const float* depth, int count, const Limits& limits, float* inverse,
                            float* tolerance);
 
-  // A pair of pixels on opposite sides of the fitted pixel.
+  // A pair of pixels on opposite sides of the fitted pixel, dx columns and dy rows from that pixel.
   struct Offset {
     std::ptrdiff_t pixels;  // offset in the image of inverse depths
-    std::int32_t counts;    // 1 + 2^8 columns^2 + 2^20 rows^2
-    std::int32_t product;   // columns x rows
+    std::int32_t counts;    // 1 + 2^8 dx^2 + 2^20 dy^2: three sums over pairs in one integer
+    std::int32_t product;   // dx dy
     float dx;
     float dy;
-    float steepest;  // maximum difference of the pair due to slope, per inverse depth
+    float steepest;  // maximum difference of the pair due to slope, divided by the inverse depth
   };
-  // Planes around each pixel; `support` is 0 without a plane.
+  // Planes around each pixel, in inverse depth.
   struct InversePlanes {
-    float* value;
-    float* by_column;
-    float* by_row;
-    std::uint8_t* support;
+    float* value;           // at the pixel
+    float* by_column;       // derivative by the column
+    float* by_row;          // derivative by the row
+    std::uint8_t* support;  // number of fitted pixels; 0: no plane
   };
-  // Fits planes to the pixels with `wanted` not 0; nullptr: to all pixels.
+  // Fits planes, with at least `min_pairs` pairs, to pixels whose `wanted` is not 0 (nullptr: all).
   void (*fit)(const float* inverse, const float* tolerance, const std::uint8_t* wanted, int count,
               const Offset* offsets, std::size_t offset_count, float min_pairs,
               const InversePlanes& planes);
 
+  // PixelRays of a row, with the offsets of the rows above and below; 0 at the edge of the image.
   struct Rays {
     const float* x;
     const float* y;
-    // Offsets of the rows above and below; 0 at the edge of the image.
     std::ptrdiff_t above;
     std::ptrdiff_t below;
   };
-  // Planes of a row in the optical frame: z on the pixel's ray, normal, cosine of incidence,
-  // support.
+  // Planes of a row in the optical frame: z on the ray, normal, cosine of incidence, support.
   struct Planes {
     float* depth_m;
     float* normal[3];
     float* cosine;
     std::uint8_t* support;
   };
-  struct PlaneCounts {
+  struct PlaneCounts {  // as in DepthPixelCounts
     int used;
     int flying;
     int grazing;
@@ -78,20 +77,21 @@ struct DepthPlaneLoops {
   PlaneCounts (*finish)(const float* inverse, const InversePlanes& fitted, const Rays& rays,
                         int count, float min_cosine, const Planes& planes);
 
+  // Transform from the camera to the grid, and noise as in DepthNoise.
   struct Placement {
-    float rotation[9];  // row by row
-    float translation[3];
-    float scale;
+    float rotation[9];     // row by row
+    float translation[3];  // voxels
+    float scale;           // voxels per m
     float axial_m;
     float axial_of_range;
     float axial_of_square;
   };
   struct PlacedElements {
-    float* position[3];
+    float* position[3];  // voxels
     float* normal[3];
     float* weight;
   };
-  // Transforms planes with support to the grid.
+  // Transforms planes with support to the grid, weighted by cosine, support and depth noise.
   void (*place)(const Planes& planes, const float* ray_x, const float* ray_y, int count,
                 const Placement& placement, const PlacedElements& placed);
   // Transforms measured depths to x and y in the grid.
@@ -99,7 +99,7 @@ struct DepthPlaneLoops {
                        const Placement& placement, float* x, float* y);
 };
 
-// Returns the loops for an instruction set that the processor has.
+// Returns the loops for an instruction set, which the processor must support.
 const DepthPlaneLoops& depth_plane_loops_of(InstructionSet instructions);
 
 }  // namespace libmap

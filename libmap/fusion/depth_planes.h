@@ -22,7 +22,7 @@ namespace libmap {
 
 struct DepthPlaneOptions : DepthSensor {
   int radius_px = 3;               // 1 to 7: radius of the disc of pixels that a plane is fitted to
-  double min_pair_fraction = 0.5;  // minimum share of agreeing pairs of opposite pixels in the disc
+  double min_pair_fraction = 0.5;  // 0 to 1: minimum share of agreeing pairs (fit_depth_planes)
 };
 
 // Numbers of pixels by outcome.
@@ -33,11 +33,11 @@ struct DepthPixelCounts {
   std::size_t without_ray = 0;  // lens distortion cannot be inverted
   std::size_t flying = 0;       // not on a surface of neighboring pixels
   std::size_t grazing = 0;      // incidence above the maximum
-  std::size_t used = 0;
+  std::size_t used = 0;         // pixels with a plane
 };
 void describe(ResultTable& table, const DepthPixelCounts& counts);
 
-// Planes of all pixels, row by row; support is 0 for pixels without a plane.
+// Planes of all pixels, row by row; all values are 0 for pixels without a plane.
 struct DepthPlanes {
   int width = 0;
   int height = 0;
@@ -48,10 +48,10 @@ struct DepthPlanes {
   DepthPixelCounts counts;
 };
 
-// Fits each pixel's plane to the pairs of opposite neighbors with a mean that agrees with the pixel
-// within the noise, by mean inverse depth and least-squares slopes. A pixel with too few such
-// pairs, at the edge of a surface, takes an adjacent plane that predicts its depth within the
-// noise; without one, it is a flying pixel. Image (depth in m) and rays must have the same size.
+// Fits a plane to each pixel and its agreeing pairs of opposite neighbors: pairs whose mean inverse
+// depth equals the pixel's within the noise. A pixel with too few agreeing pairs, at the edge of a
+// surface, takes the plane of an adjacent pixel if that plane predicts its depth within the noise;
+// otherwise it is a flying pixel. Image (depth in m) and rays must have the same size.
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
                              const DepthPlaneOptions& options = {});
 
@@ -61,7 +61,7 @@ enum class FittedPixels { all, in_cells };
 
 // Fits planes to the pixels of one depth image (m) and adds the planes in `cells` to the voxels of
 // the grid, weighted by cosine, support and depth noise. Both values of `fitted` result in the same
-// voxels, except at the edges of downsampled cells. Returns the numbers of pixels by outcome.
+// voxels, except at block edges if cells.subsampling_level > 0. Returns numbers of pixels.
 DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays,
                                   const Pose& grid_from_camera, const DepthPlaneOptions& options,
                                   double voxel_size_m, const TileMask& cells, FittedPixels fitted,

@@ -22,12 +22,12 @@ namespace libmap {
 
 struct FusionFrame {
   int node = 0;
-  Pose grid_from_base = Pose::Identity();
-  std::size_t image_pixels = 0;  // number of pixels of the frame's images
+  Pose grid_from_base = Pose::Identity();  // grid frame: world frame with origin at grid_origin
+  std::size_t image_pixels = 0;            // number of pixels of the frame's images
   // Box in the grid frame, m, around the cameras and all measured points.
   Eigen::AlignedBox3d reach;
   double max_ray_length = 1.0;   // maximum ratio of a ray's length to its depth
-  double max_pixel_pitch = 0.0;  // maximum distance of adjacent rays, relative to depth
+  double max_pixel_pitch = 0.0;  // maximum distance between adjacent rays at depth 1
 };
 
 // Returns the frame at its pose; fields from image_pixels on are not set. Throws Error if the pose
@@ -35,7 +35,7 @@ struct FusionFrame {
 FusionFrame frame_at(const TrajectoryPose& pose, const Eigen::Vector3d& grid_origin,
                      double voxel_size_m, double max_depth_m);
 
-// Moves the frame's pose and reach.
+// Transforms the frame's pose and reach in the grid frame.
 void move(FusionFrame& frame, const Pose& moved_from_grid);
 
 class FusionFrames {
@@ -52,7 +52,7 @@ class FusionFrames {
   // Removes the depth of all other frames from the cache.
   void evict_others(std::span<const FusionFrame> frames);
 
-  // Returns true if the first of these frames has a color image.
+  // Returns true if the first element of `frames` has a color image.
   bool has_color(std::span<const FusionFrame> frames);
 
   std::shared_ptr<const PixelRays> rays_of(const Camera& camera) { return rays_.rays_of(camera); }
@@ -61,12 +61,12 @@ class FusionFrames {
   // for an invalid camera. Can be called from several threads.
   void measure_reach(const RgbdFrame& depth, double max_depth_m, FusionFrame& frame);
 
-  // Calls use(views, frames) for successive groups of `frames` frames; views are numbered by the
-  // index of the frame in the whole list.
+  // Calls use(views, n) for successive groups of n frames. RefinementView::frame is the index of
+  // the frame in the list `frames`.
   using UseViews = std::function<void(std::span<const RefinementView> views, std::size_t frames)>;
   void each_view_group(std::span<const FusionFrame> frames, bool color, const UseViews& use);
 
-  // Returns one view per camera, with this frame number. Can be called from several threads.
+  // Returns one view per camera, with RefinementView::frame = `number`. Thread-safe.
   std::vector<RefinementView> views_of(const FusionFrame& frame, std::uint32_t number, bool color);
 
  private:

@@ -21,7 +21,7 @@ inline constexpr int element_neighborhood = 3;
 class FusionTiling {
  public:
   using Cell = Eigen::Array<std::int64_t, 2, 1>;
-  // Tiles of about `tile_m`. `grid_origin` is the grid's origin in the world. Points are up to
+  // `tile_m` is the side of a tile, `grid_origin` the grid's origin in the world. Points are up to
   // `shift_m` from their elements, and measurements affect elements within `disc_m`.
   FusionTiling(double tile_m, double voxel_m, const Eigen::Vector3d& grid_origin, double shift_m,
                double disc_m)
@@ -33,8 +33,7 @@ class FusionTiling {
         frame_margin_(element_margin_ + element_neighborhood + 1 +
                       static_cast<int>(std::ceil((shift_m + disc_m) / voxel_m))) {}
 
-  // Calls use(tile) for each tile affected by a frame with measurements inside `reach` (m, grid
-  // frame).
+  // Calls use(tile) for each tile that a frame with the box `reach` (m, grid frame) affects.
   template <typename Use>
   void each_tile(const Eigen::AlignedBox3d& reach, const Use& use) const {
     const auto tile_of = [&](const Eigen::Vector3d& position, int margin) -> Cell {

@@ -1,5 +1,4 @@
-// Estimates normals of a cloud from planes through each point's neighbors, and orients normals
-// towards the sensor.
+// Estimates normals of a cloud by planes through neighboring points, and orients the normals.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +13,7 @@
 namespace libmap {
 
 struct NormalEstimationOptions {
-  int neighbors = 16;  // 3 to 1000: points to which a plane is fitted, with the point itself
+  int neighbors = 16;  // 3 to 1000: nearest points to which a plane is fitted, with the point
 };
 void bind(ParameterTable& table, NormalEstimationOptions& options);
 
@@ -22,7 +21,7 @@ void bind(ParameterTable& table, NormalEstimationOptions& options);
 enum class NormalOrientation {
   view_fields,   // sensor position per point in the fields vp_x, vp_y, vp_z, as in PCL
   viewpoint,     // the cloud's viewpoint, if it is not the identity
-  spanning_tree  // consistent between neighbors; each component outwards or up
+  spanning_tree  // consistent between neighbors; each connected component points outwards or up
 };
 std::string_view to_text(NormalOrientation orientation);
 
@@ -31,14 +30,14 @@ struct NormalEstimationResult {
   std::vector<Eigen::Vector3f> normals;
   std::size_t undefined = 0;  // number of zero normals
   NormalOrientation orientation = NormalOrientation::spanning_tree;
-  std::size_t parts = 0;  // independently oriented components of the graph of neighbors
+  std::size_t parts = 0;  // connected components of the graph of neighbors; spanning_tree only
 };
 
-// Fits planes by total least squares (Hoppe et al. 1992, section 3.2). Without views, orientations
-// are propagated along the minimum spanning tree of the graph of neighbors, weighted by the angle
-// between normals (section 3.3). Each component is then oriented away from the component's center
-// or up, whichever is more distinct. The result does not depend on the number of threads. Throws
-// Error if an option is out of range or the cloud is inconsistent.
+// Fits planes by total least squares (Hoppe et al. 1992, section 3.2). If the cloud has no sensor
+// position, orientations are propagated along the minimum spanning tree of the graph of neighbors,
+// weighted by the angle between normals (section 3.3). Each component is then oriented away from
+// its center or up, whichever is more distinct. The result does not depend on the number of
+// threads. Throws Error if an option is out of range or the cloud is inconsistent.
 NormalEstimationResult estimate_normals(const PointCloud& cloud,
                                         const NormalEstimationOptions& options = {});
 

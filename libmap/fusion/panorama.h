@@ -26,8 +26,8 @@ struct PanoramaView {
 
 struct PanoramaOptions {
   int stride_px = 1;  // >= 1: uses every n-th row and column
-  // >= 0: drops flying pixels, with a depth that differs by more than this from both neighbors in a
-  // row or column; 0: keeps all.
+  // >= 0: drops flying pixels, i.e. pixels whose depth differs by more than this from both
+  // neighbors in the row or column; 0: keeps all pixels.
   double flying_pixel_jump_m = 0.0;
   // Adds unit normals of the surface through a pixel and its four neighbors, towards the camera;
   // zero if neighbors are missing or neighboring depths differ by more than normal_jump_m.
@@ -41,7 +41,7 @@ struct PanoramaCounts {
   std::size_t unmeasured = 0;  // no depth
   std::size_t too_near = 0;
   std::size_t too_far = 0;
-  std::size_t flying = 0;
+  std::size_t flying = 0;       // flying_pixel_jump_m
   std::size_t without_ray = 0;  // lens distortion cannot be inverted
   std::size_t points = 0;
 };
@@ -52,9 +52,9 @@ struct PanoramaResult {
   std::vector<PanoramaCounts> views;  // one per input view
 };
 
-// Back-projects pixels (thesis eq. 2-12: x = (u - cx) d / fx, y = (v - cy) d / fy, z = d, after
-// removal of lens distortion) and applies robot_from_camera (eq. 3-1 to 3-4). Throws Error if an
-// option is out of range.
+// Back-projects each pixel (u, v) with depth d: x = (u - cx) d / fx, y = (v - cy) d / fy, z = d,
+// after removal of lens distortion (eq. 2-12 of the thesis, see README). Then applies
+// robot_from_camera (eq. 3-1 to 3-4). Throws Error if an option is out of range.
 PanoramaResult make_panorama(const std::vector<PanoramaView>& views,
                              const PanoramaOptions& options = {});
 

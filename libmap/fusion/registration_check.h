@@ -8,7 +8,7 @@
 
 namespace libmap {
 
-// Returns the costs of up to 72 pairs of overlapping frames before and after a registration.
+// Returns the costs of up to 72 pairs of overlapping frames with the poses of `before` and `after`.
 RegistrationCheck check_registration(FusionFrames& images, std::span<const FusionFrame> before,
                                      std::span<const FusionFrame> after, const DepthSensor& sensor,
                                      double voxel_size_m);

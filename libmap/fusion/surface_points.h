@@ -12,16 +12,17 @@
 namespace libmap {
 
 // Side, in voxels, of blocks of the x-y plane. Points that only one or two frames measured are
-// dropped if others contradict at least half of such points in the block and its eight neighbors.
+// dropped from a block if other frames contradict (see through or miss) at least half of them in
+// the block and its eight neighbors.
 inline constexpr int contradiction_block = 16;
 
 struct SurfacePointOptions {
   int min_views = 1;  // minimum number of distinct frames that measured a point
-  // Maximum ratio of views that see through a point to views that see it, weighted by cosine
-  // (Merrell et al. 2007).
+  // Maximum ratio of views that see through a point to views that see the point, weighted by the
+  // cosine of incidence (Merrell et al. 2007).
   double max_seen_through = 0.3;
-  // Maximum ratio of views that measured nothing around a point, although the point is in range and
-  // not oblique, to views that see it. Removes moving objects in front of an open background.
+  // Maximum ratio of views that measured no depth around a point, although it is in range and not
+  // oblique, to views that see the point. Removes moving objects in front of an open background.
   double max_missed = 1.5;
 };
 
@@ -30,15 +31,15 @@ struct SurfacePointCounts {
   std::size_t max_views = 0;        // maximum number of frames that measured one element
   std::size_t seen_through = 0;     // dropped: views see through the points
   std::size_t missed = 0;           // dropped: views measured nothing at the points
-  std::size_t contradicted = 0;     // dropped: measured by one or two frames, in a block where
-                                    // others contradict at least half of such points
+  std::size_t contradicted = 0;     // dropped: measured by one or two frames, in or beside a block
+                                    // with many contradicted points (contradiction_block)
   std::size_t beyond_edge = 0;      // dropped: beyond an edge where the surface bends
-  std::size_t merged = 0;           // merged with another point, or an echo of one
+  std::size_t merged = 0;           // merged with another point of the same or the next voxel
   std::size_t extended_points = 0;  // points of the cloud beyond measured edges
 };
 
 struct SurfacePoints {
-  // Normals; colors if the surface has them; fields `views` and `expected_error`.
+  // Normals; colors if the surface has colors; fields as in DepthFusionResult::cloud.
   PointCloud cloud;
   SurfacePointCounts counts;
 };

@@ -16,16 +16,16 @@ struct TileMask;  // tile_mask.h
 
 class SurfaceVoxels {
  public:
-  // Sums over the measurements of a voxel; lengths in voxels.
+  // Weighted sums over the measurements of a voxel.
   struct Sum {
     float weight = 0.0F;
-    Eigen::Vector3f offset = Eigen::Vector3f::Zero();  // from the voxel's center
+    Eigen::Vector3f offset = Eigen::Vector3f::Zero();  // from the voxel's center, voxels
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     std::uint32_t frames = 0;  // number of frames
   };
 
-  // Adds one measurement at `position`, in voxels; ignored beyond voxel_cell_limit. A voxel has two
-  // sides: normals opposite to the mean of the first belong to the second.
+  // Adds one measurement at `position`, in voxels; ignored beyond voxel_cell_limit. A voxel has up
+  // to two sums; the second is of normals opposite to the mean normal of the first (thin objects).
   void add(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, float weight);
   // Sums of one frame without the hash index, which would need most of the memory.
   struct Frame {
@@ -51,15 +51,15 @@ class SurfaceVoxels {
 
 // Surface element: a point with a normal, to be refined.
 struct SurfaceElement {
-  Eigen::Vector3f position = Eigen::Vector3f::Zero();  // voxels
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();  // grid frame, voxels or m
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();    // towards the cameras
   bool extended = false;                               // one voxel beyond measured voxels
 };
 
-// Returns one element per column of voxels and surface in the column. Columns are parallel to the
-// axis nearest to the normal; elements are on their center lines. If noise spreads a surface over
-// two voxels of a column, the voxel with more weight is used. With `extend`, adjacent empty columns
-// get an element too. The order depends on the voxels only.
+// Returns one element per column of voxels and surface in the column, in voxels. A column is
+// parallel to the axis nearest to the normal; its elements are on its center line. If noise spreads
+// a surface over two voxels of a column, the voxel with more weight is used. With `extend`, empty
+// columns beside a surface get an element too. The order is a function of the occupied voxels.
 std::vector<SurfaceElement> surface_elements(const SurfaceVoxels& voxels, bool extend);
 
 }  // namespace libmap

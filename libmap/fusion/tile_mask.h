@@ -11,8 +11,8 @@
 namespace libmap {
 
 struct TileMask {
-  Eigen::Array2i low = Eigen::Array2i::Constant(-voxel_cell_limit);
-  Eigen::Array2i high = Eigen::Array2i::Constant(voxel_cell_limit);  // excluded
+  Eigen::Array2i low = Eigen::Array2i::Constant(-voxel_cell_limit);  // first column
+  Eigen::Array2i high = Eigen::Array2i::Constant(voxel_cell_limit);  // last column + 1
   // Selects one in 2^level random blocks of 4 x 4 columns; a larger level selects a subset.
   unsigned subsampling_level = 0;
 

@@ -1,4 +1,4 @@
-// Finds redundant frames by the information of earlier frames. Private to depth_fusion.
+// Finds redundant frames, which add little information to earlier frames. Private to depth_fusion.
 #pragma once
 
 #include <cstdint>
@@ -11,18 +11,18 @@
 
 namespace libmap {
 
-// Information of one frame: inverse variances of sampled pixels, summed per cell.
+// Information of one frame: inverse variances of sampled pixels, summed per cell of the grid.
 struct FrameCoverage {
   VoxelIndex cells;
-  std::vector<float> information;
-  std::vector<std::uint32_t> pixels;
+  std::vector<float> information;     // 1/m^2, one per cell
+  std::vector<std::uint32_t> pixels;  // number of pixels, one per cell
 
   // Adds about 5000 pixels of a depth image, within the sensor's range.
   void add(const DepthImage& depth, const PixelRays& rays, const Pose& grid_from_camera,
            const DepthSensor& sensor, double cell_size_m);
 };
 
-class ViewCoverage {
+class ViewCoverage {  // information of all frames that were added
  public:
   // Returns true if, at over 5 % of its pixels, the frame adds more than 1/views to the information
   // of the pixel's cell.

@@ -15,8 +15,8 @@ struct ViewComparison {
   std::vector<float> color;             // 1 - correlation of the brightness of 5 x 5 pixels
 };
 
-// Compares about 2000 pixels of `from`, sampled on a grid. Entries of `color` also require texture,
-// depth without a jump, and a relative difference of depth of at most `gate`.
+// Compares about 2000 pixels of `from`, sampled on a grid, with `onto`. An entry of `color` is NaN
+// also without texture, at a depth jump, or if the absolute value of `depth` is above `gate`.
 ViewComparison compare_views(const RefinementView& from, const RefinementView& onto,
                              const Pose& onto_from, float gate);
 

@@ -19,7 +19,7 @@ class BlockSystem {
   // Adds `block` at (row, column) and, off the diagonal, its transpose at (column, row).
   void add(std::size_t row, std::size_t column, const Matrix6d& block);
   void add_rhs(std::size_t row, const Vector6d& rhs);
-  // Adds a residual with derivatives by two blocks; `rhs` is -information * residual.
+  // Adds a residual with derivatives by the blocks a and b; `rhs` is -information * residual.
   void add_pair(std::size_t a, std::size_t b, const Matrix6d& by_a, const Matrix6d& by_b,
                 const Matrix6d& information, const Vector6d& rhs);
   void add(const BlockSystem& other);                         // `other` has the same size

@@ -23,7 +23,7 @@ struct CalibrationBounds {
   double frame_time_s = 0.033;                  // > 0: maximum depth delay and rolling shutter time
   double max_depth_correction_m = 0.01;         // >= 0: maximum depth correction: constant term
   double max_depth_correction_of_range = 0.02;  // >= 0: term proportional to range, m/m
-  double deviations = 4.0;  // for other parameters, in prior deviations; no parameter of commands
+  double deviations = 4.0;  // of other parameters, in standard deviations of the prior; no option
 };
 
 struct BundleAdjustmentOptions {
@@ -33,17 +33,17 @@ struct BundleAdjustmentOptions {
   bool refine_depth = false;         // a DepthCorrection per camera
   bool refine_registration = false;  // pose of the depth camera relative to the color camera
   bool refine_timing = false;        // a CameraTiming per camera and a velocity per node
-  // Standard deviations of the priors.
-  double focal_prior = 0.02;            // > 0: of the focal length, relative
-  double center_prior_px = 8.0;         // > 0: of the principal point
-  double depth_prior = 4.0;             // > 0: of the depth correction, relative to the depth noise
-  double depth_smoothness_prior = 0.7;  // > 0: of the correction's second differences, likewise
+  // Standard deviations of the priors, > 0. Depth priors are relative to the depth noise.
+  double focal_prior = 0.02;            // of the focal length, relative to the focal length
+  double center_prior_px = 8.0;         // of the principal point
+  double depth_prior = 4.0;             // of the depth correction
+  double depth_smoothness_prior = 0.7;  // of the second differences of the correction's spline
   double depth_knot_m = 0.2;            // >= 0.02: distance of the knots of the correction's spline
   CalibrationBounds bounds{};
-  // No parameters of commands.
+  // The following fields have no command option.
   DepthNoise depth_noise{};      // depth noise, to which the depth priors are relative
   CameraTiming timing_mean{};    // mean of the timing's prior; the deviation is frame_time_s
-  double tolerance = 1e-6;       // converged if a step reduces the cost by less than this share
+  double tolerance = 1e-6;       // converged if a step reduces the cost by less than this fraction
   bool fixes_cameras = false;    // cameras keep the calibration `start`; velocities are free
   bool fixes_poses = false;      // poses are fixed
   std::size_t alternatives = 0;  // maximum number of alternative calibrations in the result
@@ -60,59 +60,58 @@ void bind(ParameterTable& table, BundleAdjustmentOptions& options);
 std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
                                           const BundleAdjustmentOptions& options);
 
-// Standard deviation of the mean relative depth correction of a camera's features. Images and depth
-// do not distinguish a depth scale error from a larger scene, so the depth camera sets the scale.
+// Standard deviation of the prior that the mean relative depth correction of a camera's features is
+// 0. Images and depth do not reveal a depth scale error, so the depth camera sets the scale.
 inline constexpr double depth_gauge = 1e-6;
 // Standard deviation of the prior of a registration's shift, m.
 inline constexpr double registration_prior_m = 0.02;
 
 struct BundleAdjustmentResult {
   std::map<int, Pose> map_from_base;
-  std::vector<Eigen::Vector3d> points;  // in the map, one per track; 0 without two poses
-  SensorCalibration calibration;        // of the free parameters; empty without any
-  // Calibrations that differ from `calibration` by one standard deviation, along the independent
-  // directions that change positions most.
+  std::vector<Eigen::Vector3d> points;  // map frame, one per track; 0 with fewer than two poses
+  SensorCalibration calibration;        // estimated parameters; empty without any
+  // Each alternative differs from `calibration` by one standard deviation, in one of the
+  // independent directions in parameter space that change the poses' positions most.
   std::vector<SensorCalibration> alternatives;
-  SensorCalibration deviations;  // standard deviations of intrinsics and timing, with alternatives
-  // Information of steps of the poses (rigid_motion.h) at the optimum, in the order of
+  SensorCalibration deviations;  // of intrinsics and timing; empty without `alternatives`
+  // Information matrix of steps of the poses (rigid_motion.h) at the optimum, in the order of
   // map_from_base, including the links. Points are eliminated (Schur complement).
   BlockSystem information{0};
-  std::size_t tracks = 0;
-  std::size_t conflicts = 0;  // matches without a track (FeatureTracks)
+  std::size_t tracks = 0;     // number of used tracks
+  std::size_t conflicts = 0;  // FeatureTracks::conflicts
   std::size_t observations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;
-  // Root mean squares of the residuals of inliers.
-  double reprojection_rms_px = 0.0;
-  double depth_rms_m = 0.0;
-  std::size_t outliers = 0;  // observations with a weight below one half
+  double reprojection_rms_px = 0.0;  // RMS residual of inliers
+  double depth_rms_m = 0.0;          // RMS residual of inliers
+  std::size_t outliers = 0;          // observations with a weight below one half
   int iterations = 0;
-  bool converged = false;  // the result is usable
+  bool converged = false;  // true: the result is usable
 };
 
-// Adjusts poses, points and free camera parameters. The resulting poses fit frames with the
-// resulting calibration (calibrate()). `links` are the graph's other links (odometry, other
-// closures, priors). The gauge node of each component is fixed. The information is computed from
-// `system_tracks` if there are any: with TrackFrames::linked tracks the information is sparse and
-// slightly smaller. `start` is the initial calibration; by default the stored cameras and the
-// motion between poses. Memory is proportional to (number of poses)^2. Throws Error if an option is
-// out of range.
+// Adjusts poses, points and the camera parameters that `options` frees. The resulting poses are for
+// frames to which the resulting calibration is applied (calibrate()). `links` are links of the pose
+// graph that are not from the tracks, e.g. odometry. The gauge node of each component is fixed.
+// `start` is the initial calibration; by default the stored cameras and the motion between poses.
+// `system_tracks`, if any, replace `tracks` in information, counts and residuals (add_information);
+// with TrackFrames::linked, the information matrix is sparse and slightly smaller. Memory is
+// proportional to (number of poses)^2. Throws Error if an option is out of range.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
     const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options = {},
     const std::vector<FeatureTrack>& system_tracks = {}, const SensorCalibration& start = {});
 
-// Adjusts the tracks built from feature links, as above. From 120 poses on it uses the sparse
-// system of the links (sparse_adjustment.h), unless camera parameters are free. Throws as above.
+// Builds tracks from feature links and adjusts them as above. From 120 poses on, adjust_sparse
+// (sparse_adjustment.h) is used, unless camera parameters are free. Throws Error as above.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& feature_links,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
     const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options = {},
     const SensorCalibration& start = {}, Progress& progress = no_progress());
 
-// Sets the information, the counts and the residuals of a result. `points` are the points of
-// `tracks` (map frame); if empty, points are estimated at the result's poses.
+// Sets information, counts and residuals of `result`. `points` are the points of `tracks` (map
+// frame); if empty, they are estimated at the poses of `result`.
 void add_information(const std::vector<FrameFeatures>& frames,
                      const std::vector<FeatureTrack>& tracks,
                      const std::vector<GraphLinkResult>& links,

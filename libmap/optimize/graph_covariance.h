@@ -1,4 +1,4 @@
-// Computes covariances of a graph's poses from the information of the links at the optimum.
+// Computes covariances of a pose graph's poses from the information of the links at the optimum.
 #pragma once
 
 #include <map>
@@ -25,8 +25,8 @@ class GraphCovariance {
 
   bool valid() const { return solver_->valid(); }  // true if the graph determines the poses
   bool connected(int a, int b) const;              // true if both are in one component
-  // The covariances below are of steps (rigid_motion.h) and require valid() and nodes with a pose.
-  // Returns the covariance of a node's pose relative to the gauge node of the component.
+  // Returns the covariance of a node's pose relative to the gauge node of its component.
+  // Covariances are of steps (rigid_motion.h) and require valid() and nodes with a pose.
   Matrix6d of_node(int node) const { return between(node, node); }
   // Returns the covariance of a_from_b for two connected nodes.
   Matrix6d of_relative(int a, int b) const;

@@ -10,7 +10,7 @@
 
 namespace libmap {
 
-// A link with its group. Links of one group have a common scale of covariances.
+// A link with its group. PoseGraphOptions::recalibrate scales the covariances of a group together.
 struct GraphLink {
   PoseLink link{};
   std::string group{};
@@ -21,7 +21,7 @@ struct GraphLinkResult {
   PoseLink link{};  // with the final, recalibrated information
   bool rejected = false;
   double weight = 1.0;      // weight by the robust loss, 0 to 1; 0 if rejected
-  double chi_square = 0.0;  // squared residual at the optimum, whitened
+  double chi_square = 0.0;  // squared residual at the optimum, in standard deviations
 };
 
 // Throws Error if the motion or the information matrix is not finite, or if the information matrix
@@ -40,7 +40,7 @@ std::vector<GraphLink> odometry_links(const PoseGraph& graph);
 
 // Returns the step (rigid_motion.h) from the measured to the actual relative pose; for a pose
 // prior, from the measured to the actual pose. For gravity, the rotation part is the cross product
-// of both up directions. Absolute links ignore `to`.
+// of the measured and the actual up direction. Absolute links (prior, gravity) ignore `to`.
 Vector6d link_residual(const PoseLink& link, const Pose& from, const Pose& to);
 
 // Derivatives of link_residual by steps of both poses.
@@ -53,12 +53,12 @@ LinkJacobian link_jacobian(const PoseLink& link, const Pose& from, const Pose& t
 // Returns the inverse covariance of the residual; isotropic for gravity.
 Matrix6d link_information(const PoseLink& link);
 
-// Returns half the sum of weighted squares over links that are not rejected and have all poses.
+// Returns half the sum of weighted chi-squares of the links in use (not rejected, all poses known).
 double link_cost(const std::map<int, Pose>& map_from_base,
                  const std::vector<GraphLinkResult>& links);
 
-// Returns the normal equations of these links, with one block per node of `map_from_base`.
-// link_system contains the links between two nodes, all_link_system also the absolute links.
+// Returns the normal equations of the links in use, with one block per node of `map_from_base`.
+// link_system contains only links between two nodes, all_link_system also absolute links.
 BlockSystem link_system(const std::map<int, Pose>& map_from_base,
                         const std::vector<GraphLinkResult>& links);
 BlockSystem all_link_system(const std::map<int, Pose>& map_from_base,

@@ -24,24 +24,25 @@ struct IcpOptions {
   int iterations = 12;           // >= 1: maximum number of iterations
   int pairs_per_frame = 8;       // >= 1: for global, frames with the largest overlap per frame
   double min_overlap = 0.25;     // 0 to 1: for global, minimum overlap as a share of samples
-  int samples = 1500;            // >= 1: approximate number of samples per frame
-  double max_distance_m = 0.03;  // > 0: initial maximum distance between a sample and the plane
-  double max_normal_angle_deg = 35.0;   // maximum angle between normals of sample and plane
-  double correlation = 4.0;             // >= 1: samples equivalent to one independent sample
-  double max_degenerate_ratio = 0.002;  // 0 to 1: minimum eigenvalue ratio of a used direction
-  // No parameter of commands: the width of the loss decreases slowly, for inaccurate initial poses
-  // (graduated non-convexity, Blake and Zisserman 1987).
+  int samples = 1500;            // >= 1: approximate number of surface samples per frame
+  double max_distance_m = 0.03;  // > 0: initial maximum distance between a sample and its plane
+  double max_normal_angle_deg = 35.0;  // maximum angle between normals of sample and plane
+  double correlation = 4.0;  // >= 1: number of samples that count as one independent sample
+  // 0 to 1: directions are ignored whose eigenvalue is smaller, relative to the largest eigenvalue.
+  double max_degenerate_ratio = 0.002;
+  // The width of the robust loss decreases slowly, for inaccurate initial poses (graduated
+  // non-convexity, Blake and Zisserman 1987). No command option.
   bool graduated = false;
 };
 void bind(ParameterTable& table, IcpOptions& options);
 
 struct IcpResult {
   std::map<int, Pose> map_from_base;
-  // Information of prior and surfaces in the order of the poses, divided by deviation_scale^2.
+  // Information matrix of prior and surfaces, in the order of the poses, over deviation_scale^2.
   BlockSystem information{0};
-  double deviation_scale = 1.0;  // >= 1: ratio of the errors to errors by independent noise
-  std::size_t pairs = 0;
-  std::size_t samples = 0;                // matched samples in the last iteration
+  double deviation_scale = 1.0;  // >= 1: ratio of the poses' errors to errors by independent noise
+  std::size_t pairs = 0;         // number of aligned pairs
+  std::size_t samples = 0;       // matched samples in the last iteration
   std::size_t degenerate_directions = 0;  // number of ignored directions of all pairs
   double initial_rms_m = 0.0;             // RMS distance along normals, first iteration
   double final_rms_m = 0.0;               // RMS distance along normals, last iteration
@@ -51,9 +52,9 @@ struct IcpResult {
   double max_distance_m = 0.0;         // final maximum distance between a sample and a plane
 };
 
-// Aligns the surfaces of frames with a pose. `prior` is the information of steps from
-// `map_from_base` (BundleAdjustmentResult::information), one block per pose. It determines
-// directions that the surfaces do not constrain. `links` selects the pairs of IcpMode::links. The
+// Aligns the surfaces of frames with a pose. `prior` is the information matrix of steps from
+// `map_from_base` (BundleAdjustmentResult::information), one block per pose, for directions that
+// the surfaces do not constrain. For IcpMode::links, `links` selects the pairs. The
 // gauge node of each component is fixed. Returns the input poses and the prior if there are no
 // pairs or the alignment diverges. The result does not depend on the number of threads. Throws
 // Error if the size of `prior` is not the number of poses.
@@ -63,8 +64,8 @@ IcpResult align_surfaces(const std::vector<FrameFeatures>& frames,
                          const std::vector<PoseLink>& links, const IcpOptions& options = {},
                          Progress& progress = no_progress());
 
-// Returns the normal equations of the surfaces of `pairs` for steps of the poses. Each frame of a
-// pair must have a pose.
+// Returns the normal equations of the surfaces of `pairs` for steps of the poses, one block per
+// pose of `map_from_base`. Each frame of a pair must have a pose.
 BlockSystem surface_system(const std::vector<FrameFeatures>& frames,
                            const std::map<int, Pose>& map_from_base,
                            const std::vector<FramePair>& pairs, double max_distance_m,

@@ -22,7 +22,7 @@
 namespace libmap {
 
 struct BundleObservation {
-  std::size_t node = 0;          // row of the pose
+  std::size_t node = 0;          // index of the pose in JointState::poses
   Eigen::Index first_param = 0;  // index of the camera's first parameter
   CalibratedFeature feature;
 };
@@ -32,11 +32,11 @@ inline double robust_weight(const Eigen::Vector3d& residual, double scale) {
   return cauchy_weight(residual.squaredNorm() / (scale * scale));
 }
 
-// Refers to a state at which observations are evaluated; does not own the data.
+// Poses, motions and cameras at which observations are evaluated; does not own the data.
 struct BundleView {
-  std::vector<const Pose*> poses;                  // by row
-  const std::vector<Vector6d>* motions = nullptr;  // by row; nullptr: no motion
-  const double* camera_params = nullptr;
+  std::vector<const Pose*> poses;                  // by index of the pose
+  const std::vector<Vector6d>* motions = nullptr;  // by index of the pose; nullptr: no motion
+  const double* camera_params = nullptr;           // parameters of all cameras
 
   explicit BundleView(const std::map<int, Pose>& map_from_base) {
     for (const auto& [node, pose] : map_from_base) poses.push_back(&pose);
@@ -89,7 +89,7 @@ class PointSchur {
     return by_node;
   }
 
-  // Adds the terms of the node to the system. Observations must be added by ascending node.
+  // Adds the observation's terms without the point. Observations must be added by ascending node.
   void add(const BundleObservation& observation, const CalibratedResidual& seen, double weight,
            System& system) {
     const ByNode jacobian = by_node(seen);
@@ -102,7 +102,7 @@ class PointSchur {
     rhs_.noalias() -= weighted_point * seen.residual;
   }
 
-  // Eliminates the point. Lazy products, because Eigen's general product copies such blocks first.
+  // Eliminates the point. Lazy products, because Eigen's general product copies its factors first.
   void eliminate(System& system) {
     if (views_.empty()) return;
     inverse_ = hessian_.inverse();
@@ -132,17 +132,17 @@ class PointSchur {
 
 struct JointProblem {
   std::vector<BundleObservation> observations;  // grouped by point
-  std::vector<std::size_t> begin = {0};         // first observation by point; one more than points
+  std::vector<std::size_t> begin = {0};         // index of each point's first observation, and end
   double robust_scale = 3.0;                    // width of Cauchy's loss, standard deviations
   std::vector<bool> fixed;                      // by pose; true: the pose is constant
   bool fix_cameras = false;
-  // Camera parameters outside this range have no influence on the residuals.
+  // Camera parameters before first_param and from end_param on have no influence on the residuals.
   Eigen::Index first_param = 0;
   Eigen::Index end_param = std::numeric_limits<Eigen::Index>::max();
   bool has_motion = false;            // true: motions are unknown
-  std::vector<Vector6d> motion_mean;  // prior of the motions
+  std::vector<Vector6d> motion_mean;  // prior of the motions, by pose
   std::vector<Vector6d> motion_deviation;
-  // Prior of the camera parameters x: residuals prior x - prior_mean.
+  // Prior of the camera parameters x, with the residuals prior * x - prior_mean.
   Eigen::MatrixXd prior;
   Eigen::VectorXd prior_mean;
   std::vector<GraphLinkResult> links;
@@ -156,7 +156,7 @@ struct JointProblem {
 struct JointState {
   std::map<int, Pose> poses;
   std::vector<Vector6d> motions;  // by pose, base frame, m/s and rad/s
-  Eigen::VectorXd camera_params;  // of all cameras
+  Eigen::VectorXd camera_params;  // parameters of all cameras
   std::vector<Eigen::Vector3d> points;
 };
 
@@ -182,8 +182,8 @@ struct JointSystem {
   }
 };
 
-// Optimizes by Levenberg-Marquardt. Converges when a step reduces the cost by less than the share
-// `tolerance`. The cost of the state never increases.
+// Optimizes by Levenberg-Marquardt. Converges when a step reduces the cost by less than the
+// fraction `tolerance`. The cost of the state never increases.
 LeastSquaresSummary adjust_jointly(const JointProblem& problem, JointState& state,
                                    int max_iterations, double tolerance);
 

@@ -1,5 +1,5 @@
-// Optimizes pose graphs (Lu and Milios 1997) by least squares over all links, with residuals
-// whitened by L^T (information = L L^T), with Ceres.
+// Optimizes pose graphs (Lu and Milios 1997) by least squares over all links, with Ceres. Residuals
+// are multiplied by L^T, where L L^T is the information matrix of the link.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ struct PoseGraphOptions {
   bool recalibrate = true;
   int recalibrations = 6;        // >= 1: maximum number of recalibration rounds
   double robust_scale = 4.1;     // >= 0: width of Cauchy's loss, standard deviations; 0: not robust
-  double max_chi_square = 40.0;  // > 0: of a closure's six residuals; closures above are rejected
+  double max_chi_square = 40.0;  // > 0: closures with a larger chi-square are rejected
   int gauge_node = 0;            // fixed node; 0: the first node of each component
 };
 void bind(ParameterTable& table, PoseGraphOptions& options);
@@ -30,15 +30,15 @@ struct LinkGroupResult {
   std::size_t rejected = 0;
   double translation_scale = 1.0;  // factor of the standard deviations
   double rotation_scale = 1.0;
-  double redundancy = 0.0;                // sum of the redundancy numbers of the links
+  double redundancy = 0.0;                // degrees of freedom of the group's residuals
   double translation_rms_before_m = 0.0;  // accepted links at the input poses
   double rotation_rms_before_deg = 0.0;
   double translation_rms_m = 0.0;  // accepted links at the optimum
   double rotation_rms_deg = 0.0;
 };
 
-// Nodes that are connected by links. The gauge node is fixed, but its tilt is free if the component
-// has gravity links, and its whole pose if it has priors.
+// Nodes that are connected by links. The pose of the gauge node is fixed. However, its tilt is free
+// if the component has gravity links, and its whole pose is free if the component has priors.
 struct GraphComponent {
   std::vector<int> nodes;
   int gauge_node = 0;
@@ -49,7 +49,7 @@ struct PoseGraphResult {
   std::vector<GraphLinkResult> links;             // in the order of the input
   std::map<std::string, LinkGroupResult> groups;  // by GraphLink::group
   std::vector<GraphComponent> components;  // largest first; a node without links is a component
-  std::vector<int> without_links;          // nodes
+  std::vector<int> without_links;          // nodes without a link
   double initial_cost = 0.0;  // half the robust sum of squares before the last optimization
   double final_cost = 0.0;
   int iterations = 0;

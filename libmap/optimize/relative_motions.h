@@ -18,7 +18,7 @@ struct KnownMotion {
 };
 
 // Returns the velocity by node, for each frame with a pose. Poses of different components are in
-// different frames; if `components` is empty, all poses are in one frame.
+// different coordinate frames; if `components` is empty, all poses are in one coordinate frame.
 std::map<int, KnownMotion> relative_motions(const std::vector<FrameFeatures>& frames,
                                             const std::map<int, Pose>& poses,
                                             const std::vector<GraphComponent>& components);

@@ -1,6 +1,6 @@
-// Adjusts long scans with fixed cameras by bundle adjustment with a sparse system of poses, each
-// point at the optimum for the poses (variable projection). Memory and time are proportional to the
-// number of observations, plus the fill-in of the links' graph.
+// Bundle adjustment of long scans with fixed cameras, with a sparse system of poses. Each point is
+// at the optimum for the poses (variable projection). Memory and time are proportional to the
+// number of observations, plus the fill-in of the factorization.
 #pragma once
 
 #include <map>
@@ -11,7 +11,7 @@
 namespace libmap {
 
 // Normal equations of tracks over poses. Observations by frames without a pose are ignored, and
-// then tracks with fewer than two observations.
+// tracks with fewer than two other observations.
 class TrackSystem {
  public:
   // Keeps references to `frames` and `tracks`. `robust_scale` is the width of Cauchy's loss.
@@ -26,11 +26,11 @@ class TrackSystem {
 
   struct Totals {
     double cost = 0.0;
-    std::size_t tracks = 0;  // with observations from two or more poses
+    std::size_t tracks = 0;  // number of tracks with observations from two or more poses
     std::size_t observations = 0;
     std::size_t outliers = 0;    // observations with a weight below one half
-    double pixel_squares = 0.0;  // px^2, of the inliers
-    double depth_squares = 0.0;  // m^2, of the inliers
+    double pixel_squares = 0.0;  // sum of squared image residuals of the inliers, px^2
+    double depth_squares = 0.0;  // sum of squared depth residuals of the inliers, m^2
 
     // Sets counts and root mean squares of the result; the cost is not used.
     void add_to(BundleAdjustmentResult& result) const;

@@ -14,8 +14,8 @@
 
 namespace libmap {
 
-// Parses COLUMNSxROWS:METERS, e.g. "8x6:0.03": numbers of inner corners (3 to 100), and side of a
-// square (> 0, at most 1 m). Throws Error for any other text.
+// Parses COLUMNSxROWS:METERS, e.g. "8x6:0.03": columns and rows of inner corners (3 to 100), and
+// side of a square (> 0, at most 1 m). Throws Error for any other text.
 Chessboard parse_known_board(const std::string& text);
 
 // Corners of the board in one image.
@@ -25,21 +25,21 @@ struct BoardView {
   std::vector<Eigen::Vector2d> corners{};  // px, in the order of find_chessboard
 };
 
-// Finds the board in all images of the frames, without poses; skips unreadable images. Returns one
-// entry per image that shows the whole board, in the order of the frames, for any number of
-// threads. Throws Error if fewer than two nodes see the whole board.
+// Finds the board in all images of the frames; skips unreadable images. Returns one entry per image
+// that shows the whole board, in the order of the frames. Throws Error if images of fewer than two
+// nodes show the whole board.
 std::vector<BoardView> find_boards(const ScanSource& scan, const std::vector<FrameFeatures>& frames,
                                    const Chessboard& board, Progress& progress = no_progress());
 
 // Estimates pose and size of the board in the map by generalized least squares of the corners'
-// pixels, with the noise of the corners and of the poses. `covariance`: 6x6 by node, of a pose step
-// (rigid_motion.h), map units and rad; poses of nodes without an entry are exact. Views of nodes
-// without a pose, and views that contradict the others (another board, or a moved one), are
-// skipped. `frames` have the stored calibration; `calibration` is applied to them. In the result,
-// `lengths` is the number of used views; `chi_square`, per degree of freedom, compares the views
-// with the board. If `chi_square` is above 1, `deviation` is multiplied by sqrt(chi_square). Throws
-// Error if no two images agree on the board's pose, or if the standard deviation of the scale is
-// above 3 %, e.g. because all views are from one location.
+// pixels, with the noise of the corners and of the poses. Inputs: `frames` with the stored
+// calibration; `calibration`, which is applied to them; `covariance` by node of a pose step
+// (rigid_motion.h), map units and rad (poses of nodes without an entry are exact). Skips views of
+// nodes without a pose, and views that contradict the others (another board, or a moved one). In
+// the result, `lengths` is the number of used views, and `chi_square` compares the views with the
+// board; above 1, `deviation` is multiplied by sqrt(chi_square). Throws Error if no two images
+// agree on the board's pose, or if the standard deviation of the scale is above 3 %, e.g. because
+// all views are from one location.
 ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
                              const SensorCalibration& calibration,
                              const std::map<int, Pose>& map_from_base,

@@ -1,4 +1,4 @@
-// Detects depth that is not registered to color, and registers it coarsely before refinement.
+// Detects depth that is not registered to color, and registers depth coarsely before refinement.
 #pragma once
 
 #include <memory>
@@ -13,16 +13,16 @@ namespace libmap {
 struct CoarseRegistration {
   std::unique_ptr<ScanSource>
       scan{};  // scan with registered depth; nullptr: the given scan is used
-  Pose color_from_depth = Pose::Identity();  // true pose of depth; identity without `scan`
+  Pose color_from_depth = Pose::Identity();  // of the depth camera; identity without `scan`
   std::string finding{};                     // displacement of depth; empty if there is none
 };
 
-// Registers the depth of all frames if edges of depth are displaced (check_edge_agreement). Without
-// `may_register`, only returns the finding. The scan must outlive the result. Throws Error if
-// `may_register` and the depth camera has another focal length than stored.
+// Registers the depth of all frames if depth edges are displaced from color edges
+// (check_edge_agreement). Without `may_register`, only sets `finding`. `scan` must outlive the
+// result. Throws Error if `may_register` and the stored focal length of depth is wrong.
 CoarseRegistration register_coarsely(const ScanSource& scan, bool may_register);
 
-// Adds the coarse registration of all `cameras` to a calibration of the registered scan.
+// Combines the calibration of a registered scan with the coarse registration of all `cameras`.
 void add_registration(const Pose& color_from_depth, std::size_t cameras,
                       SensorCalibration& calibration);
 

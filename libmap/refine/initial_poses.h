@@ -14,20 +14,20 @@ enum class StartPoses { automatic, odometry, stored, visual };
 
 struct InitialPoses {
   std::map<int, Pose> map_from_base;
-  // Ascending nodes of each part, whose poses are in one frame: sessions, joined by links.
+  // Groups of nodes (sessions, joined by links) with poses in one coordinate frame; nodes ascend.
   std::vector<std::vector<int>> parts;
-  std::vector<int> without_pose;  // valid nodes with neither a pose nor links to one
-  std::string source;  // source of the poses: "odometry", "stored", "links", or "visual" for none
+  std::vector<int> without_pose;  // nodes without a pose, except with GraphNode::invalid_weight
+  std::string source;             // "odometry", "stored", "links", or "visual" (no poses)
 };
 
-// Selects the initial poses. automatic: odometry if all valid nodes have it, else stored poses if
-// there are any, else the available odometry, else links only. Nodes without a pose get one from
-// links. Sessions with odometry but without links between them remain separate parts. visual
-// returns no poses. Throws Error if `start` is odometry or stored and the scan has no such poses.
+// Selects the initial poses. automatic: odometry if all valid nodes have it; otherwise stored
+// poses, the available odometry or links, in this order. Nodes without a pose get one from links.
+// Sessions with odometry but without links between them remain separate parts. visual returns no
+// poses. Throws Error if `start` is odometry or stored and the scan has no poses of this source.
 InitialPoses initial_poses(const PoseGraph& graph, StartPoses start);
 
-// Joins parts that are connected by links: transforms the smaller part rigidly to satisfy one link
-// to the larger part, the link with which most others agree. Returns all remaining parts.
+// Joins parts that are connected by links: transforms the smaller part rigidly to satisfy the link
+// to the larger part with which most of these links agree. Returns all remaining parts.
 std::vector<std::vector<int>> join_parts(std::map<int, Pose>& map_from_base,
                                          const std::vector<std::vector<int>>& parts,
                                          const std::vector<PoseLink>& links);

@@ -18,26 +18,26 @@ struct NoiseEstimate {
   std::size_t residuals = 0;   // number of residuals used
   double nearest_m = 0.0;      // median range of the nearest tenth of the residuals
   double farthest_m = 0.0;     // median range of the farthest tenth
-  double largest_ratio = 1.0;  // >= 1: maximum of estimated / assumed noise and its inverse
+  double largest_ratio = 1.0;  // >= 1: largest factor between estimated and assumed noise
 };
 
-// Fits non-negative constant, linear and quadratic terms to the robust spread of the residuals in
-// ten bins of range. Returns nullopt for fewer than a thousand finite residuals.
+// Fits constant, linear and quadratic terms of range, >= 0, to the robust spread of the residuals
+// in ten bins of range. Returns nullopt for fewer than a thousand residuals that are not NaN.
 std::optional<NoiseEstimate> estimate_noise(const std::vector<SurfaceResidual>& residuals,
                                             const DepthNoise& assumed);
 
 // Noise that a stage uses for a scan.
 struct ScanNoise {
   DepthNoise noise{};
-  bool is_estimated = false;  // the estimate replaces the assumed noise
+  bool is_estimated = false;  // true: the estimate replaces the assumed noise
   std::string sentence{};     // noise and its source, for reports
 };
 // Returns the estimate if it differs from the assumed noise by more than a factor of 1.8 at any
 // range, else the assumed noise.
 ScanNoise choose_noise(const std::vector<SurfaceResidual>& residuals, const DepthNoise& assumed);
 
-// Chooses the noise by the held-out depth of up to 12 pairs of near frames, which the other depth
-// aligns. The noise of `planes` is kept if is_noise_given. Frames that cannot be read are ignored.
+// Chooses the noise by held-out depth of up to 12 pairs of near frames, which the other depth
+// aligns. Keeps the noise of `planes` if is_noise_given. Ignores frames that cannot be read.
 ScanNoise choose_noise(const ScanSource& scan, const Trajectory& world_from_base,
                        const std::string& sensor, const DepthPlaneOptions& planes,
                        Progress& progress = no_progress());
@@ -45,7 +45,7 @@ ScanNoise choose_noise(const ScanSource& scan, const Trajectory& world_from_base
 // Returns true if `sensor` is not "auto", or an axial term of the noise is not the default.
 bool is_noise_given(const std::string& sensor, const DepthNoise& noise);
 
-// Returns the terms as text, e.g. "1.2 mm + 0.10 % of range + 1.9 mm/m2 of range squared".
+// Returns the terms as text, e.g. "1.2 mm + 0.10 % of range + 1.90 mm/m2 of range squared".
 std::string describe(const DepthNoise& noise);
 
 }  // namespace libmap

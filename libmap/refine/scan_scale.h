@@ -14,7 +14,7 @@
 
 namespace libmap {
 
-// Distance between two points that are given as pixels of images, measured in the field.
+// Distance, measured in the field, between two points that are given as pixels of images.
 struct KnownLength {
   struct End {
     int node = 0;
@@ -22,7 +22,7 @@ struct KnownLength {
   };
   End from;
   End to;
-  double length_m = 0.0;  // > 0
+  double length_m = 0.0;  // > 0: true length
 };
 
 // Parses NODE:X:Y-NODE:X:Y=METERS with pixels X:Y of the first camera, e.g.
@@ -34,7 +34,7 @@ struct ScaleEstimate {
   double factor = 1.0;
   double deviation = 0.0;   // standard deviation of the factor
   std::size_t lengths = 0;  // number of measurements used
-  double chi_square = 0.0;  // against the factor, per degree of freedom; 0 for one measurement
+  double chi_square = 0.0;  // per degree of freedom, against the factor; 0 for one measurement
 };
 
 // Checks the ends of known lengths before poses are estimated. Throws Error if an end's node has no
@@ -45,20 +45,20 @@ void check_known_lengths(const std::vector<FrameFeatures>& frames,
 // Estimates the scale by least squares of the ratios of true and estimated lengths. Each end has
 // the noise of the depth plane and of half a pixel; errors of the poses are neglected. `frames`
 // have the stored calibration; `calibration` is applied to them. Throws Error as
-// check_known_lengths, for nodes without a pose, and for a distance within three standard
-// deviations.
+// check_known_lengths does, if an end's node has no pose, and if the estimated length is less than
+// three times its standard deviation.
 ScaleEstimate scale_by_lengths(const std::vector<FrameFeatures>& frames,
                                const SensorCalibration& calibration,
                                const std::map<int, Pose>& map_from_base,
                                const std::vector<KnownLength>& lengths);
 
 // Estimates the scale from the translations of accepted odometry links (LinkType::neighbor) and
-// their information. Returns nullopt if there are none.
+// their information. Returns nullopt if there is no accepted odometry link.
 std::optional<ScaleEstimate> scale_by_odometry(const std::vector<GraphLinkResult>& links,
                                                const std::map<int, Pose>& map_from_base);
 
-// Scales positions about the position of `fixed_node` (the origin if it has no pose), and the depth
-// of the calibration after registration and correction. `cameras`: number of cameras.
+// Scales positions about the position of `fixed_node` (the origin if it has no pose), and
+// DepthCorrection::scale of all `cameras` in `calibration`.
 void apply_scale(double factor, int fixed_node, std::size_t cameras,
                  std::map<int, Pose>& map_from_base, SensorCalibration& calibration);
 

@@ -20,12 +20,12 @@ struct CalibrationInput {
   const std::vector<FrameFeatures>& frames;  // with the stored cameras
   const std::vector<FeatureLink>& links;
   const std::map<int, Pose>& map_from_base;
-  const std::vector<GraphLinkResult>& graph_links;  // links that are not from features
+  const std::vector<GraphLinkResult>& graph_links;  // links of the pose graph except `links`
   const std::vector<GraphComponent>& components;
   BundleAdjustmentOptions options;
 };
 
-// Parts of a calibration, true for estimated parts.
+// Parts of a calibration; true: the part is estimated.
 struct CalibrationParts {
   bool intrinsics = false;
   bool depth = false;
@@ -40,12 +40,12 @@ CalibrationParts parts_of(const SensorCalibration& calibration);
 
 struct CalibrationChoice {
   CalibrationParts parts{true, true, true, true};  // parts that may be estimated
-  bool only_if_better = true;  // require that the held-out data fit clearly better
-  bool drop_unneeded = true;   // drop parts that are not needed
-  // Estimate the registration with every model. Required for depth that is registered coarsely,
-  // because other parts would absorb the error of that registration.
+  bool only_if_better = true;  // require that held-out data (held_out.h) fit clearly better
+  bool drop_unneeded = true;   // drop parts that do not clearly improve the fit
+  // Estimate the registration in all cases. Required for depth with a coarse registration, because
+  // other parts would absorb the error of this registration.
   bool keeps_registration = false;
-  bool converge = true;     // iterate the best model to the tolerance of the options
+  bool converge = true;     // iterate the best model to BundleAdjustmentOptions::tolerance
   SensorCalibration start;  // initial values; empty: the stored cameras
 };
 
@@ -53,18 +53,19 @@ struct CalibrationEstimate {
   std::size_t frames = 0;             // number of frames used
   SensorCalibration calibration;      // empty: the stored calibration remains
   BundleAdjustmentResult adjustment;  // best model on these frames, without information
-  HeldOutEvaluation held_out;         // best model against stored calibration, these frames
+  HeldOutEvaluation held_out;         // change from the stored calibration to the best model
   std::vector<std::pair<std::string, HeldOutEvaluation>>
-      evaluated_models;                                         // held_out of each model
+      evaluated_models;                                         // name and held_out of each model
   std::vector<std::pair<std::string, std::string>> impossible;  // models and the bounds they exceed
 };
 
-// Selects a calibration by bundle adjustments. Timing alone is tried first; it is the result if the
-// other parts do not clearly improve the fit. Otherwise intrinsics, depth corrections and
-// registration are estimated together, because a false focal length absorbs depth errors. Each of
-// these parts is then dropped unless the held-out data fit clearly worse without it. If the joint
-// model does not fit clearly better, intrinsics alone are tried. Timing is then tried with the
-// remaining parts. At most 80 linked frames are used. Throws Error if an option is out of range.
+// Selects a model (set of parts) by bundle adjustments of at most 80 linked frames:
+// 1. Timing alone is the result if all parts together do not fit the held-out data clearly better.
+// 2. Otherwise, intrinsics, depth corrections and registration are estimated together, because a
+//    false focal length absorbs depth errors; if this is not clearly better, intrinsics alone.
+// 3. A part is dropped if the held-out data do not fit clearly worse without it.
+// 4. Timing is added if the held-out data then fit clearly better.
+// Throws Error if an option is out of range.
 CalibrationEstimate estimate_calibration(const CalibrationInput& input,
                                          const CalibrationChoice& choice);
 
@@ -72,9 +73,9 @@ CalibrationEstimate estimate_calibration(const CalibrationInput& input,
 BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
                                         const SensorCalibration& known, std::size_t count);
 
-// Replaces the motions in `calibration` by motions of all frames with a pose, estimated at the
-// timing of `calibration`. `fixes_poses` fixes the poses during the estimate. The estimate begins
-// at the motions of `known`, if any. The rest of `calibration` is unchanged.
+// Replaces the motions in `calibration` by motions of all frames with a pose, estimated with the
+// timing of `calibration`. `fixes_poses` fixes the poses during the estimate. The initial values
+// are the motions of `known`, if any. Changes nothing else in `calibration`.
 void estimate_motions(const CalibrationInput& input, bool fixes_poses,
                       SensorCalibration& calibration, const SensorCalibration& known = {});
 
@@ -82,12 +83,12 @@ void estimate_motions(const CalibrationInput& input, bool fixes_poses,
 bool is_similar_registration(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
                              double turn_rad, double time_s);
 
-// Returns the first camera with the calibration applied, for a file. `image` is the camera of the
-// stored images; `graph` contains the time stamps of the nodes.
+// Returns the first camera with the calibration applied, for a file. `image` is this camera at the
+// size of the images, which may be smaller. `graph` contains the time stamps of the nodes.
 CameraFile calibrated_camera(const Camera& stored, const Camera& image,
                              const SensorCalibration& calibration, const PoseGraph& graph);
 
-// Returns one sentence per corrected fault of a camera; `deviations` are standard deviations.
+// Returns one sentence per corrected error of a camera. `deviations` are standard deviations.
 std::vector<std::string> findings(const SensorCalibration& calibration,
                                   const SensorCalibration& deviations,
                                   const std::vector<Camera>& cameras);

@@ -1,5 +1,5 @@
-// RGB-D visual odometry: tracks each frame against the last key frame by features and depth of
-// features. After a tracking loss, relocalizes against similar earlier frames.
+// RGB-D visual odometry: tracks each frame against the last key frame by features with depth. After
+// a tracking loss, relocalizes against similar earlier frames.
 #pragma once
 
 #include <cstddef>
@@ -20,15 +20,15 @@ struct VisualOdometryOptions {
   int keyframe_inliers = 100;         // >= 0: fewer matches with the key frame
   double keyframe_distance_m = 0.3;   // > 0: larger distance from the key frame
   double keyframe_angle_deg = 20.0;   // > 0: larger rotation from the key frame
-  int relocalization_candidates = 8;  // >= 0: similar earlier frames compared with a lost one
+  int relocalization_candidates = 8;  // >= 0: similar frames with which a lost frame is matched
 };
 void bind(ParameterTable& table, VisualOdometryOptions& options);
 
 // Sessions, and poses that are known before tracking.
 struct TrackingStart {
-  std::map<int, int> session;           // by node; 0 by default; tracks end with their session
+  std::map<int, int> session;           // by node, 0 by default; tracking stops between sessions
   std::map<int, Pose> map_from_base;    // known poses by node, which are not changed
-  std::vector<std::vector<int>> parts;  // disjoint groups of nodes with known poses in one frame
+  std::vector<std::vector<int>> parts;  // disjoint groups, known poses in one coordinate frame
   std::map<int, Pose> first;            // pose of a new part's first node; the identity by default
 
   int session_of(int node) const {
@@ -42,8 +42,8 @@ struct TrackingLoss {
   int node = 0;
   int key_frame = 0;         // node of the key frame that did not match; 0: none
   std::string reason{};      // e.g. "too few matches"
-  int relocalized_node = 0;  // this node or a later one of its part, once relocalized; 0: none
-  int relocalized_at = 0;    // node with which relocalized_node was matched
+  int relocalized_node = 0;  // relocalized node of the same part, maybe a later one; 0: none
+  int relocalized_at = 0;    // node with which relocalized_node was matched; 0: none
 };
 
 // Returns text on the first five losses: node, reason, and the nodes of the relocalization.
@@ -51,43 +51,43 @@ std::string describe(const std::vector<TrackingLoss>& losses);
 
 struct VisualOdometryResult {
   std::map<int, Pose> map_from_base;    // by node: all frames, and the known poses
-  std::vector<std::vector<int>> parts;  // nodes with poses in one frame; possibly a single node
+  std::vector<std::vector<int>> parts;  // groups of nodes with poses in one coordinate frame
   // Links of tracked frames (LinkType::neighbor) and of relocalized frames (local_space_closure).
   std::vector<FeatureLink> links;
   std::vector<PoseLink> depth_links;  // links of frames tracked by depth only
-  std::set<FramePair> tried_pairs;    // pairs that need not be tried again
+  std::set<FramePair> tried_pairs;    // pairs of frames that need not be matched again
   std::vector<int> key_frames;        // nodes, ascending
   std::vector<TrackingLoss> losses;
-  std::size_t relocalized = 0;  // number of relocalized frames, with or without a part
+  std::size_t relocalized = 0;  // number of relocalizations, of a frame alone or with its part
 };
 
 // Tracks frames in the order of the list. A frame that matches neither the key frame nor the last
 // frame (verify_pairs) is tracked by depth (align_pair), from the pose that constant motion or a
-// few matches (guess_motion) predict. If this fails too, the frame is lost. It is relocalized if
-// the motions to two earlier frames agree, else it begins a new part, which a later key frame may
-// join to another part. Covariances of motions (estimate_relative_pose) are scaled by the
-// residuals. Throws Error if an option is out of range.
+// few matches (guess_motion) predict. If this fails too, the frame is lost. A lost frame is
+// relocalized if its motions to two earlier frames agree. Otherwise, it begins a new part, which a
+// later key frame may join to another part. Covariances of links are multiplied by the chi-square
+// of the matches per degree of freedom. Throws Error if an option is out of range.
 VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
                                   const TrackingStart& start,
                                   const LoopClosureDetectionOptions& matching,
                                   const VisualOdometryOptions& options, std::uint64_t seed,
                                   Progress& progress = no_progress());
 
-// Recovers frames that visual odometry lost, for example to motion blur, from depth. track_frames
-// calls it last. Frames of parts of up to four frames are aligned by depth (align_pair) with the
-// nearest frames of larger parts before and after them. The initial pose is from constant motion,
-// interpolated between both sides or extrapolated from one, else from a few matches (guess_motion).
-// Alignments with both sides must agree. In `result` the frame's part is then joined to the larger
-// parts, and the links are added to depth_links. `start` contains sessions and known poses.
+// Recovers frames that visual odometry lost, for example due to motion blur, from depth.
+// track_frames calls it last. A frame of a part of up to four frames is aligned by depth
+// (align_pair) with the nearest frames of larger parts before and after it. The initial pose is
+// from constant motion, interpolated between both sides or extrapolated from one side, else from a
+// few matches (guess_motion). Alignments with both sides must agree. In `result`, the frame's part
+// is then joined to the larger parts, and the links are added to depth_links.
 void place_lost_frames(const std::vector<FrameFeatures>& frames, const TrackingStart& start,
                        const LoopClosureDetectionOptions& matching, std::uint64_t seed,
                        VisualOdometryResult& result);
 
-// Normalized estimation error squared (Bar-Shalom et al. 2001) of links against true poses, per
-// degree of freedom: mean of e^T information e / 6. It is near 1 if the covariances are correct.
-// Links without true poses at both ends are ignored.
+// Normalized estimation error squared (Bar-Shalom et al. 2001) of links against true poses. Links
+// without true poses at both ends are ignored.
 struct LinkConsistency {
-  std::size_t links = 0;
+  std::size_t links = 0;  // number of evaluated links
+  // Mean of e^T I e / 6 (error e, information matrix I); near 1 if the covariances are correct.
   double squared_error_per_freedom = 0.0;
 };
 LinkConsistency link_consistency(const std::vector<FeatureLink>& links, const Trajectory& truth);

@@ -40,17 +40,17 @@ HeightFunction heights_of(const std::vector<Eigen::Vector3d>& points, double rad
                           int min_points);
 
 struct EdgeCheckOptions {
-  int positions_per_edge = 7;  // >= 1: positions per edge, at the centers of as many equal parts
+  int positions_per_edge = 7;  // >= 1: positions at the centers of this many equal parts of an edge
   double inset_m = 0.05;       // >= 0: distance of the positions from the edge
 };
 void bind(ParameterTable& table, EdgeCheckOptions& options);
 
 struct EdgeCheckPoint {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
-  std::optional<double> height_m{};  // of the surface; nullopt if it has no height there
-  std::optional<double> ground_m{};  // of the ground; nullopt if it has no height there
+  std::optional<double> height_m{};  // height of the surface; nullopt: no surface at the position
+  std::optional<double> ground_m{};  // height of the ground; nullopt: no ground at the position
 
-  // Height above the ground; nullopt unless both are known.
+  // Height of the surface above the ground; nullopt if height_m or ground_m is.
   std::optional<double> error_m() const {
     if (!height_m || !ground_m) return std::nullopt;
     return *height_m - *ground_m;
@@ -58,8 +58,8 @@ struct EdgeCheckPoint {
 };
 
 struct EdgeCheckResult {
-  std::array<std::vector<EdgeCheckPoint>, 4> edges;  // a, b, c, d
-  std::array<std::optional<double>, 4> mean_m;       // mean absolute error by edge
+  std::array<std::vector<EdgeCheckPoint>, 4> edges;  // positions by edge: a, b, c, d
+  std::array<std::optional<double>, 4> mean_m;       // mean absolute error by edge; nullopt: none
   std::size_t measured = 0;                          // positions with an error
   std::size_t missing = 0;                           // positions without an error
   double mean_abs_error_m = 0.0;                     // over all measured positions
@@ -68,7 +68,7 @@ struct EdgeCheckResult {
 };
 
 // Compares `surface` with `ground` at positions along the site's edges. Throws Error if an option
-// is out of range, the inset is half of a side or more, or at no position do both have a height.
+// is out of range, the inset is half of a side or more, or no position has both heights.
 EdgeCheckResult check_edges(const SiteCorners& site, const HeightFunction& surface,
                             const HeightFunction& ground, const EdgeCheckOptions& options = {});
 

@@ -14,7 +14,7 @@ namespace libmap {
 
 struct GroundPlaneOptions {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // approximate up direction, of any length
-  double tolerance_m = 0.02;                      // > 0: maximum distance of the inliers of a plane
+  double tolerance_m = 0.02;                      // > 0: maximum distance of inliers from a plane
   double max_tilt_deg = 40.0;  // > 0, < 90: maximum angle between the ground's normal and `up`
   double min_fraction = 0.05;  // (0, 1]: minimum share of the points on a plane
   // (0, 1]: minimum size of a lower plane to be the ground, relative to the largest plane.
@@ -30,7 +30,7 @@ struct GroundPlane {
   double offset_m = 0.0;                              // normal . p = offset_m on the plane
   Eigen::Vector3d center = Eigen::Vector3d::Zero();   // of the inliers, projected to the plane
   double rmse_m = 0.0;                                // root mean square distance of the inliers
-  std::size_t inliers = 0;                            // points within the tolerance
+  std::size_t inliers = 0;                            // number of points within the tolerance
   double fraction = 0.0;                              // inliers as a share of all points
   double tilt_deg = 0.0;                              // angle between the normal and `up`
 };

@@ -17,16 +17,16 @@ void bind(ParameterTable& table, SiteRectangleOptions& options);
 
 struct SiteRectangle {
   Eigen::Vector2d center = Eigen::Vector2d::Zero();
-  double yaw_deg = 0.0;  // of the rectangle's x axis; -45 to 45 for a square, otherwise -90 to 90
+  double yaw_deg = 0.0;  // of the rectangle's x axis: -45 to 45 for a square, otherwise -90 to 90
   double clearance_m = 0.0;  // distance by which every side could move outwards
 };
 
-// Finds the rectangle of size_m.x() along the rectangle's x axis and size_m.y() along the y axis
-// that has the largest clearance, over all positions and directions. Among equal rectangles, the
-// smallest rotation and the mean position are used. `points` are the data in the x-y plane, with
+// Finds the rectangle with the largest clearance, over all positions and directions. Its sides are
+// size_m.x() along its x axis and size_m.y() along its y axis. Among equal rectangles, the smallest
+// rotation and the mean position are used. `points` are the measured points in the x-y plane, with
 // gaps below max_gap_m between neighbors. Clearances down to one cell below margin_m are accepted.
 // Throws Error if an option is out of range, there is no point, or no rectangle fits (the error's
-// bound is the largest size that does).
+// bound is the largest size that fits).
 SiteRectangle find_site_rectangle(const std::vector<Eigen::Vector2d>& points,
                                   const Eigen::Vector2d& size_m,
                                   const SiteRectangleOptions& options = {});

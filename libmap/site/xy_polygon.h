@@ -1,4 +1,4 @@
-// Polygons of the x-y plane without self-intersections, convex or not, and cropping of clouds.
+// Simple polygons of the x-y plane, convex or not, and cropping of clouds.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,8 +23,7 @@ class XyPolygon {
   // cross or touch, or there is no area.
   explicit XyPolygon(std::vector<Eigen::Vector2d> corners);
 
-  // Counter-clockwise.
-  const std::vector<Eigen::Vector2d>& corners() const { return corners_; }
+  const std::vector<Eigen::Vector2d>& corners() const { return corners_; }  // counter-clockwise
   double area_m2() const { return area_m2_; }
   Eigen::Vector2d min() const { return min_; }
   Eigen::Vector2d max() const { return max_; }

@@ -16,17 +16,18 @@ namespace libmap {
 // Name of the face field that is 1 on triangles that fill holes, 0 on others.
 inline constexpr const char* filled_field = "filled";
 
-using BoundaryLoop = std::vector<HalfEdge>;  // as boundary_loops()
+using BoundaryLoop = std::vector<HalfEdge>;  // closed boundary, as from boundary_loops()
 
-// Returns the boundaries of an oriented manifold with a diameter (largest distance between two
-// vertices) of at most `max_hole_m`. The longest boundary of a component is the outer boundary and
-// not returned, unless its radius is less than half of the component's radius about the same point.
-// If the mesh is part of a larger one that is complete only within the box `known` in x and y,
-// boundaries beyond the box are not holes, and components beyond it have no outer boundary inside.
+// Returns the holes of an oriented manifold: boundaries with a diameter (largest distance between
+// two vertices) of at most `max_hole_m`. The longest boundary of a component is the outer boundary
+// and no hole, unless its radius is less than half of the component's radius (both from the mean of
+// the boundary's vertices). With `known`, the mesh is part of a larger mesh and complete only in
+// this box in x and y: boundaries that extend beyond the box are no holes, and components that
+// extend beyond the box have no outer boundary.
 using XyBox = Eigen::AlignedBox2d;
 std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m,
                                      const std::optional<XyBox>& known = std::nullopt);
-// For each component, true if it extends beyond the box `known`; all false without a box.
+// Returns for each component true if it extends beyond the box `known`; all false without a box.
 std::vector<bool> components_beyond(const TriangleMesh& mesh, const MeshComponents& components,
                                     const std::optional<XyBox>& known);
 
@@ -43,13 +44,13 @@ struct HoleFilling {
   double area_m2 = 0.0;       // area of the new triangles
 };
 
-// Fills each hole. Tries a faired patch, then a refined one, then a plain triangulation of the
-// boundary. A hole stays open if `check` rejects all three, or its boundary has more than 5000
-// edges. New vertices and triangles are appended. Colors and fields of new vertices are
-// interpolated from the boundary, weighted by the inverse squared distance; integer fields take the
-// value of the nearest vertex. Face fields are copied from the triangle at the nearest edge of the
-// boundary; `filled` is 1 and is created if missing. The mesh must be an oriented manifold. The
-// result does not depend on the number of threads.
+// Fills each hole. Tries a faired patch (continues the tangent planes around the hole), then a
+// refined patch (new vertices, not faired), then a plain triangulation of the boundary. A hole
+// stays open if `check` rejects all three, or its boundary has more than 5000 edges. New vertices
+// and triangles are appended. Colors and fields of new vertices are interpolated from the boundary,
+// weighted by the inverse squared distance; integer fields take the value of the nearest vertex.
+// Face fields are copied from the triangle at the nearest boundary edge; `filled` is 1 and is
+// created if missing. The mesh must be an oriented manifold. Independent of the number of threads.
 HoleFilling fill_holes(TriangleMesh& mesh, const std::vector<BoundaryLoop>& holes,
                        PatchCheck check = PatchCheck::intersection,
                        Progress& progress = no_progress());

@@ -4,11 +4,11 @@
 // Steps; each keeps the order of vertices and triangles:
 //  1. drop unused vertices; merge vertices within a tolerance into the first one; drop duplicate
 //     triangles and triangles without area
-//  2. cut at edges of more than two triangles, at vertices of more than one fan and where no
-//     consistent orientation exists; keep the orientation of most of the area (make_manifold);
-//     remove caps (triangles with a corner on the opposite edge) by flipping that edge
+//  2. cut at edges of more than two triangles, at vertices of more than one fan of triangles and
+//     where no consistent orientation exists; keep the orientation of most of the area
+//     (make_manifold); remove caps (triangles with a corner on the opposite edge; flip_caps)
 //  3. drop islands
-//  4. remove intersecting triangles with the triangles around and close the resulting holes, if
+//  4. remove intersecting triangles and the triangles around them, and close the resulting holes if
 //     possible (self_intersections, hole_filling)
 //  5. fill holes (hole_filling)
 //  6. smooth, decimate, then step 4 again
@@ -34,14 +34,14 @@ struct MeshCleaningOptions {
   double min_island_area_m2 = 0.01;  // >= 0: components with a smaller area are dropped
   double min_island_fraction = 0.0;  // 0 to 1: minimum area relative to the largest component
   // >= 0: maximum diameter (largest distance between two boundary vertices) of filled holes. The
-  // longest boundary of a component is the outer boundary and is not filled, unless the boundary
-  // radius is less than half of the component's radius (the hole of a ball).
+  // longest boundary of a component is not filled, unless its radius is less than half of the
+  // component's radius, as of a hole in a ball (find_holes).
   double max_hole_m = 0.1;
-  int smoothing_iterations = 0;  // >= 0
+  int smoothing_iterations = 0;  // >= 0: number of iterations of Taubin's smoothing
   // >= 0: maximum distance between the decimated and the original surface; 0: no decimation.
   double decimation_error_m = 0.0;
-  // Box in x and y beyond which the mesh continues; components and boundaries that extend beyond it
-  // are no islands or holes.
+  // Box in x and y beyond which the mesh may continue; nullopt: the mesh is complete. Components
+  // that extend beyond the box are no islands, boundaries that extend beyond it no holes.
   std::optional<XyBox> known = std::nullopt;
 };
 void bind(ParameterTable& table, MeshCleaningOptions& options);
@@ -61,18 +61,18 @@ struct MeshCleaningResult {
   std::size_t unused_vertices = 0;       // vertices of no triangle, dropped
   std::size_t degenerate_triangles = 0;  // removed, without area
   std::size_t duplicate_triangles = 0;   // removed
-  std::size_t cut_edges = 0;             // non-manifold, or without a consistent orientation
+  std::size_t cut_edges = 0;             // edges cut in step 2
   std::size_t split_vertices = 0;        // new copies of vertices with several fans of triangles
   std::size_t turned_triangles = 0;      // triangles whose orientation was reversed
   std::size_t islands = 0;               // dropped components
-  double island_area_m2 = 0.0;           // area of these components
-  // Removed because they intersect or are degenerate, not counting the triangles around them.
+  double island_area_m2 = 0.0;           // area of the dropped components
+  // Triangles removed in step 4, without the triangles around them.
   std::size_t intersecting_triangles = 0;
-  std::size_t closing_triangles = 0;  // new triangles in the resulting holes
-  std::size_t unclosed_holes = 0;     // resulting holes that stay open
+  std::size_t closing_triangles = 0;  // new triangles in holes that step 4 made
+  std::size_t unclosed_holes = 0;     // holes that step 4 made and that stay open
   std::size_t remaining_intersecting_triangles =
       0;                // triangles that still intersect; 0 without repair
-  HoleFilling filling;  // in step 5
+  HoleFilling filling;  // holes filled in step 5
   MeshDecimation decimation;
   StageTimings timings_s;
 };
@@ -81,22 +81,22 @@ void describe(ResultTable& table, const MeshCleaningResult& result);
 // Cleans a mesh. A clean mesh is returned unchanged except for `filled` and normals. The result
 // does not depend on the number of threads. Throws Error if an option or an index is out of range,
 // array sizes differ, a vertex is not finite, `mesh` or (without `known`) the result has no
-// triangle, or without `repair`, a mesh to be filled or decimated is no oriented manifold.
+// triangle, or a mesh to be filled or decimated without `repair` is no oriented manifold.
 MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOptions& options = {},
                               Progress& progress = no_progress());
 
 // Collapses edges into one of the two ends by quadric error (OpenMesh). Removed vertices stay
 // within a tolerance of the replacing triangles, normals turn by at most 30 degrees, and needles
-// are avoided. Then the distance between both surfaces is bounded in both directions: triangles are
-// divided until all corners of a part are within the bound of one triangle, and so, by convexity,
-// is the whole part. Vertices where it exceeds `max_error_m` are locked, and decimation is
-// repeated, later with a smaller tolerance. If all attempts fail, the mesh is unchanged. Remaining
-// vertices and triangles keep their values and order. The mesh must be an oriented manifold.
+// are avoided. Then max_error_m is proved to bound the distance between both surfaces: triangles of
+// each surface are divided until all corners of a part, and so by convexity the part, are within
+// max_error_m of one triangle of the other surface. Vertices of triangles that fail are locked, and
+// decimation is repeated, later with a smaller tolerance. If all attempts fail, the mesh is
+// unchanged. Remaining vertices and triangles keep values and order. Requires an oriented manifold.
 MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m,
                              Progress& progress = no_progress());
 
-// Decimates with the same bound in one round: original triangles replace the triangles that exceed
-// the bound, and overlap neighbors. Takes a quarter of the time. The result is not a manifold.
+// As decimate_mesh, but in one round and a quarter of the time: original triangles replace
+// triangles that exceed the bound, and overlap their neighbors. The result is not a manifold.
 MeshDecimation decimate_triangles(TriangleMesh& mesh, double max_error_m);
 
 }  // namespace libmap

@@ -13,13 +13,13 @@ namespace libmap {
 // or has a coordinate beyond +-1e30 m.
 void require_sound(const TriangleMesh& mesh);
 
-// Diagonal of the bounding box of the used vertices, m.
+// Returns the diagonal of the bounding box of all vertices that triangles use, m.
 double size_of(const TriangleMesh& mesh);
 
-// Smallest height of a triangle, m: twice the area per longest side; 0 for a repeated vertex.
+// Returns a triangle's smallest height (2 area / longest side), m; 0 for a repeated vertex.
 double lowest_height(const TriangleMesh& mesh, const Triangle& triangle);
 
-// Triangles with a lowest height of at most this share of size_of() are degenerate.
+// Returns for each triangle true if lowest_height <= degenerate_height * size_of(mesh).
 constexpr double degenerate_height = 1e-9;
 std::vector<bool> degenerate_triangles(const TriangleMesh& mesh);
 
@@ -27,12 +27,12 @@ std::vector<bool> degenerate_triangles(const TriangleMesh& mesh);
 // vertices are farther apart. Changes only the triangles. Returns the number of replaced vertices.
 std::size_t weld_vertices(TriangleMesh& mesh, double distance_m);
 
-// For each triangle, true if an earlier one has the same three vertices, in any order.
+// Returns for each triangle true if an earlier triangle has the same vertices, in any order.
 std::vector<bool> repeated_triangles(const std::vector<Triangle>& triangles);
 
-// Removes caps, degenerate triangles with a corner on the opposite edge, from an oriented manifold.
-// Flips that edge, or drops the triangle if the edge is open. Returns the number of caps removed.
-// Caps are kept if the new edge exists already, or if they depend on other caps.
+// Removes caps (degenerate triangles with a corner on the opposite edge) from an oriented manifold:
+// flips this edge, or drops the cap if the edge belongs to no other triangle. Keeps a cap if the
+// new edge exists already, or if it depends on other caps. Returns the number of removed caps.
 std::size_t flip_caps(TriangleMesh& mesh);
 
 struct ManifoldCuts {
@@ -49,8 +49,8 @@ struct ManifoldCuts {
 // straightest pair first; the others are cut off. Each component takes the orientation of most of
 // the component's area and is cut where no orientation exists (Moebius strip). Then each fan of
 // triangles at a vertex gets a separate vertex. The largest fan keeps the original. The copies for
-// the other fans are appended and moved towards the center of the fan by 1 % of the distance or by
-// `min_gap_m`, whichever is more, at most by half of the distance, so that the sheets do not touch.
+// the other fans are appended. So that the sheets do not touch, a copy is moved towards the fan's
+// center by 1 % of the distance or by `min_gap_m` (the maximum, but at most half of the distance).
 // The order of triangles is kept. No triangle may have a repeated vertex.
 ManifoldCuts make_manifold(TriangleMesh& mesh, double min_gap_m = 0.0);
 

@@ -10,7 +10,7 @@
 namespace libmap {
 
 struct MeshReportOptions {
-  bool self_intersections = true;  // counts them, which takes most of the time
+  bool self_intersections = true;  // count self-intersections, which takes most of the time
 };
 
 // Closed chain of edges that belong to one triangle only.
@@ -26,25 +26,25 @@ struct EdgeLengths {
   double max_m = 0.0;
 };
 
-// Triangles with a repeated vertex have no edges; edges, fans and used vertices do not count them.
+// Counts of edges, fans and used vertices ignore triangles with a repeated vertex.
 struct MeshReport {
   std::size_t vertices = 0;
-  std::size_t unused_vertices = 0;  // without an edge
+  std::size_t unused_vertices = 0;  // vertices without an edge
   std::size_t triangles = 0;
   std::size_t filled_triangles = 0;      // face field `filled` is 1
   std::size_t degenerate_triangles = 0;  // repeated vertex, or height below 1e-9 of the mesh's size
-  std::size_t duplicate_triangles = 0;   // with the corners of an earlier triangle, in any order
+  std::size_t duplicate_triangles = 0;   // corners as of an earlier triangle, in any order
   double area_m2 = 0.0;
   double largest_component_area_m2 = 0.0;
-  std::size_t components = 0;  // connected by edges
+  std::size_t components = 0;  // sets of triangles that are connected by edges
   EdgeLengths edge_lengths;
 
   std::size_t edges = 0;               // undirected
-  std::size_t non_manifold_edges = 0;  // with more than two triangles
+  std::size_t non_manifold_edges = 0;  // edges with more than two triangles
   // Vertices with more than one fan of triangles, without the vertices of non-manifold edges.
   std::size_t non_manifold_vertices = 0;
   std::size_t misoriented_edges = 0;     // two triangles run along the edge in the same direction
-  std::size_t boundary_edges = 0;        // with one triangle
+  std::size_t boundary_edges = 0;        // edges with one triangle
   std::vector<MeshBoundary> boundaries;  // longest first
   // Pairs of triangles that intersect in more than common corners or edges; 0 if not counted.
   std::size_t self_intersections = 0;
@@ -59,10 +59,10 @@ struct MeshReport {
     return is_closed() && is_manifold() && is_oriented() && self_intersections == 0;
   }
   long euler_characteristic = 0;  // used vertices - edges + triangles without a repeated vertex
-  // Sum over the components, with each boundary closed by a disc: components -
-  // (euler_characteristic + boundaries) / 2. -1 unless manifold and oriented.
+  // Sum of the components' genera, with each boundary closed by a disc: components -
+  // (euler_characteristic + boundaries) / 2. -1 if not manifold or not oriented.
   long genus = -1;
-  // Enclosed volume, negative for inward normals. 0 unless closed, manifold and oriented.
+  // Enclosed volume, negative for inward normals. 0 if not closed, not manifold or not oriented.
   double volume_m3 = 0.0;
 };
 void describe(ResultTable& table, const MeshReport& report);

@@ -11,10 +11,11 @@ namespace libmap {
 
 using TrianglePair = std::pair<std::uint32_t, std::uint32_t>;
 
-// Pairs (lower, higher), ascending, of triangles that intersect in more than the corners or the
-// edge with common indices. Excludes pairs with three common corners and triangles with exactly
-// collinear corners. If `only` is not empty, at least one triangle of each pair is marked. Indices
-// must be in range and vertices finite. The result does not depend on the number of threads.
+// Returns pairs (lower, higher index), ascending, of triangles that intersect in more than their
+// common corners or edge (equal vertex indices). Excludes pairs with three common corners and
+// triangles with exactly collinear corners. With `only` (one mark per triangle), at least one
+// triangle of each pair is marked. Indices must be in range and vertices finite. The result does
+// not depend on the number of threads.
 std::vector<TrianglePair> find_self_intersections(const TriangleMesh& mesh,
                                                   const std::vector<bool>& only = {});
 

@@ -16,29 +16,29 @@
 
 namespace libmap {
 
-// implicit: algebraic point set surface, which ends at the border of the points. poisson: one
-// thread, several times slower, extends about one cell farther.
+// implicit: algebraic point set surface, which ends at the border of the points. poisson: screened
+// Poisson; one thread, several times slower, extends about one cell beyond the border.
 enum class SurfaceMethod { implicit, poisson };
 
 struct SurfaceReconstructionOptions {
   SurfaceMethod method = SurfaceMethod::implicit;
-  // >= 1.5: implicit: radius of influence of a point, in cells or, if larger, point distances.
+  // >= 1.5, for implicit: radius of influence of a point, in cells or, if larger, point distances.
   double support_cells = 2.5;
   // >= 0: size of the grid's or the octree's finest cells, and about the length of the mesh's
   // edges. 0: the median distance between nearest neighbors (median_spacing).
   double cell_size_m = 0.0;
-  double screening = 4.0;  // >= 0: poisson: weight of the points relative to smoothness
+  double screening = 4.0;  // >= 0, for poisson: weight of the points relative to smoothness
   // Weights points by the inverse square of the field `expected_error` (m), if that exists; points
   // with less than the median error have equal weights.
   bool weigh_by_error = true;
-  // > 0: poisson: minimum number (or weight) of points per cell; with fewer, cells are larger.
+  // > 0, for poisson: minimum number (or weight) of points per cell; with fewer, cells are larger.
   double samples_per_cell = 2.15;
   // > 0: maximum distance of the surface from all points, in cells or, if larger, point distances.
   double trim_distance_cells = 1.5;
 };
 void bind(ParameterTable& table, SurfaceReconstructionOptions& options);
 
-// Maximum depth of the octree of poisson: 2^12 cells along the longest side, of which a tenth is
+// Maximum depth of the octree of poisson: 2^12 cells along the longest side, a tenth of them for a
 // margin. The memory of PCL's tables is proportional to the square of the number of cells.
 inline constexpr int max_octree_depth = 12;
 
@@ -50,7 +50,7 @@ class CloudStatistics {
 
   std::size_t points() const { return points_; }           // points with a normal
   std::size_t dropped_points() const { return dropped_; }  // points without a normal
-  const Bounds3d& bounds() const { return bounds_; }       // of the points with a normal
+  const Bounds3d& bounds() const { return bounds_; }       // bounds of the points with a normal
   // Origin of the grid.
   Eigen::Vector3d origin() const { return (bounds_.min + bounds_.max) / 2; }
   // Median of `expected_error`, accurate to 1.6 %; 0 if no point has an expected error.
@@ -66,12 +66,12 @@ class CloudStatistics {
 struct SurfaceReconstructionResult {
   // Has unit vertex normals, and colors and fields from the points around each vertex.
   TriangleMesh mesh;
-  double cell_size_m = 0.0;           // the given one or spacing_m
+  double cell_size_m = 0.0;           // the option cell_size_m, or spacing_m if that is 0
   double spacing_m = 0.0;             // median distance to the nearest neighbor
   std::size_t dropped_points = 0;     // points with a normal that is zero or not finite
   std::size_t samples = 0;            // number of samples: one per cell and side of the surface
   int octree_depth = 0;               // poisson; otherwise 0
-  std::size_t trimmed_triangles = 0;  // removed by trimming
+  std::size_t trimmed_triangles = 0;  // removed: too far from points, or against their normals
   StageTimings timings_s;
 };
 void describe(ResultTable& table, const SurfaceReconstructionResult& result);
@@ -84,30 +84,30 @@ struct SurfaceWork {
 };
 using AnnounceWork = std::function<void(const SurfaceWork& work)>;
 
-// Reconstructs an oriented surface that is open at the border of the points. It may have
+// Reconstructs an oriented surface that is open at the border of the points. The surface may have
 // non-manifold parts, and with poisson holes of single faces, which clean_mesh repairs. PCL runs on
-// one thread, because the result of PCL depends on the number of threads; during this time,
-// standard output and error of the process are discarded. The result does not depend on the number
-// of threads and the order of the points, except for different values at equal position and normal.
+// one thread, because its result depends on the number of threads; meanwhile, standard output and
+// error of the process are discarded. The result does not depend on the number of threads. It does
+// not depend on the order of the points, except for different values at equal position and normal.
 // A shift of the cloud shifts the mesh, except for rounding. `announce` is called with the
-// estimated work before the work begins. Throws Error if an option is out of range, the cloud has
-// no normals or inconsistent ones, the positions are fewer than 3 or on a line, the cells are
-// larger than the cloud or too small for the point spacing or the octree's depth, or PCL fails.
+// estimated work before the work begins. Throws Error if an option is out of range, PCL fails, the
+// cloud has no normals or inconsistent array sizes, or the positions are fewer than 3 or on a line;
+// or if cells are larger than the cloud, or too small for the point spacing or the octree's depth.
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
                                                 const SurfaceReconstructionOptions& options = {},
                                                 Progress& progress = no_progress(),
                                                 const AnnounceWork& announce = {});
 
 // Reconstructs the surface of a part of a cloud; `statistics` are the statistics of the whole
-// cloud. At a distance of surface_margin_m() from the points that `part` lacks, the surface equals
-// the surface of the whole cloud, except for the order. Returns an empty mesh for too few points.
-// Throws Error as reconstruct_surface and surface_margin_m.
+// cloud. Farther than surface_margin_m() from all points that `part` lacks, the surface equals the
+// surface of the whole cloud, except for the order of vertices and triangles. Returns an empty mesh
+// for too few points. Throws Error as reconstruct_surface and surface_margin_m do.
 SurfaceReconstructionResult reconstruct_part(const PointCloud& part,
                                              const CloudStatistics& statistics,
                                              const SurfaceReconstructionOptions& options,
                                              Progress& progress = no_progress());
-// Returns the distance up to which points influence the surface, m. Throws Error unless the method
-// is implicit and a cell size is given.
+// Returns the distance up to which points influence the surface, m. Throws Error if the method is
+// poisson or the cell size is 0.
 double surface_margin_m(const SurfaceReconstructionOptions& options);
 
 }  // namespace libmap

@@ -12,7 +12,7 @@ namespace libmap {
 struct SurfaceSample {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();  // m, relative to a common origin
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();    // unit, outwards
-  float weight = 1.0F;                                 // > 0
+  float weight = 1.0F;                                 // > 0: weight in the fit
   float spacing_m = 0.0F;                              // local distance between samples
 };
 
@@ -20,14 +20,14 @@ struct SurfaceSample {
 inline constexpr double max_spacing_cells = 4.0;
 
 // Algebraic point set surface (Guennebaud and Gross 2007). At x, an algebraic sphere is fitted to
-// positions and normals of the samples around, with weights weight_i (c / r_i)^2 (1 - |x - p_i|^2 /
-// r_i^2)^3 within r_i = support_cells * max(c, spacing_i), c = cell_m. The function is the sphere's
-// value at x. The zero set is computed by marching cubes (Lorensen and Cline 1987) on a grid of
-// multiples of c and oriented along the normals. Cubes are dropped, so that the surface is open at
-// the border of the samples, if the distance of a corner to the samples' weighted mean,
-// perpendicular to the mean normal, exceeds 0.4 r (Adamson and Alexa 2004). A part of the surface
-// depends only on the samples with a support that reaches the part. The result does not depend on
-// the number of threads and has positions only.
+// positions p_i and normals of the samples within r_i = support_cells * max(c, spacing_i) of x, for
+// c = cell_m. The weights are weight_i (c / r_i)^2 (1 - |x - p_i|^2 / r_i^2)^3. The function is the
+// sphere's value at x. The zero set is computed by marching cubes (Lorensen and Cline 1987) on a
+// grid of multiples of c and oriented along the normals. So that the surface is open at the border
+// of the samples, a cube is dropped if a corner is farther than 0.4 r from the samples' weighted
+// mean, perpendicular to the mean normal (Adamson and Alexa 2004; r: weighted mean of r_i). A part
+// of the surface depends only on the samples whose r_i reaches the part. The result does not depend
+// on the number of threads and has positions only.
 TriangleMesh implicit_surface(const std::vector<SurfaceSample>& samples, double cell_m,
                               double support_cells);
 
@@ -39,8 +39,7 @@ struct PoissonProblem {
   double samples_per_cell = 1.0;  // as in SurfaceReconstructionOptions
 };
 
-// Deterministic Poisson reconstruction of the whole surface, positions only. Throws Error of
-// ErrorKind::failed if PCL fails.
+// Deterministic Poisson reconstruction, positions only. Throws Error (failed) if PCL fails.
 TriangleMesh solve_poisson(const std::vector<SurfaceSample>& samples,
                            const PoissonProblem& problem);
 

@@ -23,7 +23,7 @@ struct SurfaceTileOptions {
   MeshCleaningOptions cleaning{};
 
   // Throws Error for an option that requires the whole surface (Poisson reconstruction, automatic
-  // cell size, decimation), or for tile_size_m if margin_m() is more than 16 times as large.
+  // cell size, decimation), or if margin_m() is more than 16 times tile_m.
   void check() const;
   // Maximum distance from a tile at which points affect the surface of the tile, m.
   double margin_m() const;
@@ -33,7 +33,7 @@ struct SurfaceTileOptions {
 XyBox xy_box_of(const XyTile& tile, double tile_m, double margin_m);
 
 // Adds, for each tile that may contain a part of the cloud's surface, the number of points near the
-// tile. Throws Error if tile_m is too small for the coordinates.
+// tile (surface_margin_m() + max_hole_m). Throws Error if tile_m is too small for the coordinates.
 void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& options,
                        std::map<XyTile, std::size_t>& points_in_tiles);
 
@@ -41,8 +41,8 @@ struct SurfaceTile {
   // Triangles with centers in the tile. Positions are rounded to single precision, as in files, if
   // this changes them by at most 1e-5 m.
   TriangleMesh mesh;
-  std::vector<double> component_areas_m2;  // of connected_components(mesh)
-  // Edges to triangles of other tiles: positions of the ends, and the component in `mesh`.
+  std::vector<double> component_areas_m2;  // by index in connected_components(mesh)
+  // Edges to triangles of other tiles: positions of both ends, and index of the mesh's component.
   using Edge = std::array<double, 6>;
   std::vector<std::pair<Edge, std::uint32_t>> seams;
   SurfaceReconstructionResult reconstruction;  // of the tile with its margin, without mesh
@@ -51,14 +51,14 @@ struct SurfaceTile {
 
 // Reconstructs the surface of one tile from the `points` within margin_m() of it; `statistics` are
 // the statistics of the whole cloud. The surface equals the result of reconstruct_surface() and
-// clean_mesh() for the whole cloud, except that small components (islands) at the margin are kept,
-// for SurfaceIslands. Holes beside islands narrower than min_island_area_m2 / margin_m() may stay
-// open. Throws Error as options.check(), reconstruct_part and clean_mesh.
+// clean_mesh() for the whole cloud, with two exceptions. Small components (islands) at the margin
+// are kept, for SurfaceIslands. Holes beside islands narrower than min_island_area_m2 / margin_m()
+// may stay open. Throws Error as options.check(), reconstruct_part and clean_mesh do.
 SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& statistics,
                               const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress = no_progress());
 
-// Returns the mesh without the connected components of these indices, which must be ascending.
+// Returns the mesh without the components of these indices (connected_components), ascending.
 TriangleMesh without_components(const TriangleMesh& mesh,
                                 const std::vector<std::uint32_t>& components);
 
@@ -67,7 +67,7 @@ class SurfaceIslands {
  public:
   // Adds the components of one tile.
   void add(const XyTile& tile, const SurfaceTile& made);
-  // Components that belong to islands, by tile, ascending.
+  // Indices of the components that belong to islands, by tile, ascending.
   using Dropped = std::map<XyTile, std::vector<std::uint32_t>>;
   Dropped dropped(const MeshCleaningOptions& options);
   std::size_t islands() const { return islands_; }  // number of islands, valid after dropped()

@@ -1,7 +1,7 @@
 // Packs the charts of a mesh onto texture pages. Private to libmap/texture.
 //
 // A chart is a connected set of triangles with texture from one photograph. Texture coordinates are
-// the triangles' projection, shifted by whole pixels: at a scale of 1, texels coincide with pixels.
+// scaled pixels of the photograph, shifted by whole texels; at scale 1, a texel is a pixel.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,12 +16,12 @@
 namespace libmap {
 
 struct TextureAtlasOptions {
-  int texture_size = 4096;        // maximum width and height of a page, pixels, 64 to 16384
-  double texel_size_m = 0.0;      // 0: determined by texels_per_pixel
-  double texels_per_pixel = 1.5;  // texels per photograph pixel, along one side
-  // Charts are scaled down to fit this number, unless the padding alone needs more. 0: no limit.
+  int texture_size = 4096;        // 64 to 16384: maximum width and height of a page, pixels
+  double texel_size_m = 0.0;      // >= 0: side of a texel on the surface; 0: from texels_per_pixel
+  double texels_per_pixel = 1.5;  // 0.05 to 8: texels per photograph pixel, along one side
+  // >= 0: charts are scaled down to fit this number of pages, unless padding needs more; 0: never.
   int max_pages = 64;
-  int padding_px = 3;  // width of the extrapolated border of each chart, texels; 1 to 64
+  int padding_px = 3;  // 1 to 64: width of the extrapolated border of each chart, texels
 };
 
 // A rectangle of a page that contains the colors of connected triangles.
@@ -45,20 +45,20 @@ struct PageSize {
 struct TextureAtlas {
   std::vector<TextureChart> charts;
   std::vector<PageSize> pages;  // cropped to the used area
-  // Block of one color for triangles without a photograph, neutral_size texels wide; 0: no block.
+  // Square of one color for triangles without a photograph, neutral_size texels wide; 0: no square.
   std::int32_t neutral_page = 0;
   Eigen::Vector2i neutral_corner = Eigen::Vector2i::Zero();
   int neutral_size = 0;
-  double scale = 1.0;             // common scale of all charts; below 1 if reduced for max_pages
+  double scale = 1.0;             // common factor of all charts; below 1 if reduced for max_pages
   std::size_t split_charts = 0;   // charts that were split because they exceeded a page
   std::size_t shrunk_charts = 0;  // single triangles larger than a page that were scaled down
 
-  // Returns `mesh` with black pages, and texture coordinates and page of each triangle.
+  // Returns `mesh` with black pages, and with texture coordinates and page of each triangle.
   TexturedMesh make_model(const TriangleMesh& mesh, const TexturePhotos& photos) const;
 };
 
-// Builds and packs the charts. `label` is one photograph index per triangle, or no_photo;
-// `opposite` is one per half-edge. Charts that do not fit are split or scaled down.
+// Builds and packs the charts. `label` has one photograph index per triangle, or no_photo;
+// `opposite`: see mesh_adjacency.h. Charts that do not fit a page are split or scaled down.
 TextureAtlas make_texture_atlas(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
                                 const std::vector<std::uint32_t>& label,
                                 const TexturePhotos& photos, const TextureAtlasOptions& options);

@@ -1,9 +1,9 @@
 // Textures a mesh with the photographs of a scan.
 //
 // Steps: rate the photographs that see each triangle (texture_views), assign one photograph per
-// triangle with short seams (texture_labeling), pack the resulting charts onto pages
-// (texture_atlas), estimate the relative exposure (texture_exposure), and blend the colors of the
-// best photographs of each surface point (texture_painting).
+// triangle with short seams (label_triangles), pack the resulting charts onto pages
+// (texture_atlas), estimate the relative exposure (estimate_exposure), and blend the colors of the
+// best photographs of each surface point (paint_texture). Seam: edge between two photographs.
 #pragma once
 
 #include <cstddef>
@@ -31,13 +31,11 @@ struct TextureOptions {
   TextureViewOptions views{};
   LabelingOptions labeling{};
   ExposureOptions exposure{};
-  // Maximum number of photographs blended at a surface point; 1: one photograph per triangle.
-  int blend_views = 3;
-  // Exponent of the view quality in the blending weights, >= 0.
-  double blend_exponent = 1.0;
-  // Triangles with longer sides are subdivided if a photograph may show them, so that photographs
-  // see most triangles completely or not at all; 0: never. Longer sides remain if the result would
-  // exceed both 2.5 million triangles and twice the triangles of the mesh.
+  int blend_views = 3;          // >= 1: maximum number of photographs blended at a surface point
+  double blend_exponent = 1.0;  // >= 0: exponent of the view quality in the blending weights
+  // >= 0: triangles with longer sides are subdivided if a photograph may show them, so that
+  // photographs see most triangles completely or not at all; 0: never. Longer sides remain if the
+  // result would exceed both 2.5 million triangles and twice the triangles of the mesh.
   double max_side_m = 0.05;
   Color unseen_color{128, 128, 128};  // color of triangles that no photograph shows
   bool strict = false;                // throw Error for an unusable frame instead of skipping it
@@ -57,7 +55,7 @@ struct TextureCounts {
   std::size_t pages = 0;
   double atlas_scale = 1.0;     // minimum scale of the charts; below 1 if reduced for max_pages
   double texels = 0.0;          // texels covered by triangles
-  double seams_before_m = 0.0;  // length of the seams with the best photograph for every triangle
+  double seams_before_m = 0.0;  // length of the seams if each triangle had its best photograph
   double seams_m = 0.0;         // length of the seams of the model
 
   // Square root of the mean area of a texel on the surface, m; 0 without texels.
@@ -85,10 +83,10 @@ TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
                            Progress& progress = no_progress());
 
 // Textures a mesh that is stored in tiles, one by one; memory depends on the size of a tile. Throws
-// Error as texture_mesh does, except for a tile that no photograph shows.
+// Error as texture_mesh does; a tile that no photograph shows is no error.
 class TileTexturing {
  public:
-  // Only the mesh within `margin_m` of a tile is considered as an occluder. `tiles`, `scan` and
+  // For a tile, only the mesh within `margin_m` of the tile is an occluder. `tiles`, `scan` and
   // `progress` must outlive this object.
   TileTexturing(MeshTileIndex& tiles, double margin_m, const ScanSource& scan,
                 const Trajectory& world_from_base, const TextureOptions& options,
@@ -101,7 +99,7 @@ class TileTexturing {
     TexturedMesh model;
     TextureCounts counts;
   };
-  // Textures one tile with the result of find_exposure.
+  // Textures the tile with this index in `tiles`, with the result of find_exposure.
   Tile make(std::size_t tile, const TextureExposure& exposure);
   // Returns the report on the photographs, with the running times so far and empty counts.
   TextureReport report() const;

@@ -1,4 +1,4 @@
-// Photographs of a scan: camera, pose, sharpness, pixels on demand. Private to libmap/texture.
+// Provides camera, pose, sharpness and pixels of a scan's photographs. Private to libmap/texture.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,6 +26,7 @@ class PhotoProjector {
 
   const Camera& camera() const { return camera_; }
   const Eigen::Vector3d& position() const { return position_; }  // of the camera, world frame
+  // Rotates a direction from the camera frame to the world frame.
   Eigen::Vector3d to_world(const Eigen::Vector3d& direction_in_camera) const {
     return camera_from_world_.transpose() * direction_in_camera;
   }
@@ -34,9 +35,9 @@ class PhotoProjector {
   // range of the lens model. The pixel may be outside the image.
   Eigen::Vector3d project(const Eigen::Vector3d& point_in_world) const;
 
-  // Upper bound, in pixels, of the projection of any segment of length `length_m` within the ball;
-  // 0 only if the ball is outside the photograph, infinite if the camera is in the ball or the
-  // field of view is unknown. Assumes that distortion enlarges at most twice.
+  // Returns an upper bound, in pixels, of the projected length of any segment of length `length_m`
+  // within the ball: 0 only if the ball is outside the photograph, infinite if the camera is in the
+  // ball or the field of view is unknown. Assumes that distortion enlarges at most twice.
   double max_pixels(const Eigen::Vector3d& center, double radius_m, double length_m) const;
 
  private:
@@ -52,10 +53,10 @@ struct TexturePhoto {
   int node = 0;
   std::size_t camera = 0;  // index among the frame's cameras
   PhotoProjector projector;
-  double sharpness = 1.0;  // relative to the median photograph
+  double sharpness = 1.0;  // relative to the median of all photographs
 };
 
-// Minimum depth in each square cell of a photograph.
+// Minimum depth in each square cell of a photograph, to find views beside an occluder.
 class OccluderCells {
  public:
   // Side of a cell in pixels; 0 disables the search.
@@ -66,9 +67,9 @@ class OccluderCells {
   // Adds a surface point by pixel and z (m) in the camera's frame. Ignored if z is not positive or
   // the pixel is outside the photograph.
   void add(float x, float y, float z);
-  // Returns true if a point in the pixel's cell or the eight neighbors of the cell is more than
-  // `gap_m` above the plane normal . (point - camera) = height_m. The normal is in world axes and
-  // faces the camera. The pixel must be inside the photograph.
+  // Returns true if an added point p in the pixel's cell or its eight neighbors is more than
+  // `gap_m` above the plane: normal . (p - camera) > height_m + gap_m. The normal is in world axes
+  // and faces the camera. The pixel must be inside the photograph.
   bool has_any_above(float x, float y, const Eigen::Vector3d& normal, double height_m,
                      double gap_m) const;
 
@@ -88,7 +89,7 @@ class OccluderCells {
   std::vector<Eigen::Vector3d> rays_;  // through cell centers, z = 1, world axes; zero: no ray
 };
 
-// Bicubic interpolation (Keys 1981, a = -1/2) at pixel (x, y), clamped to the image; 0 to 255.
+// Color (0 to 255) at pixel (x, y), clamped to the image: bicubic (Keys 1981, a = -1/2).
 Eigen::Vector3f sample_bicubic(const ColorImage& image, double x, double y);
 
 class TexturePhotos {

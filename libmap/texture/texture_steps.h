@@ -45,7 +45,7 @@ struct TextureExposure {
   std::vector<Eigen::Vector3f> gains;  // per photograph and channel, relative to the geometric mean
   std::array<double, 3> vignetting{0, 0, 0};  // ln(brightness): a r^2 + b r^4 + c r^6
   std::size_t observations = 0;               // number of colors used
-  // Standard deviation of ln(color) of one surface point between photographs, before and after.
+  // Standard deviation of ln(color) of one point between photographs, before and after correction.
   double log_color_deviation_before = 0.0;
   double log_color_deviation = 0.0;
 
@@ -58,26 +58,26 @@ struct ExposureOptions {
   bool vignetting = true;  // estimate vignetting, common to all
 };
 
-// Estimates exposure by least squares over all points seen in several photographs (Brown and Lowe
+// Estimates exposure by least squares over all vertices seen in several photographs (Brown and Lowe
 // 2007, equation 29, in logarithms; vignetting as in Goldman and Chen 2005), with Huber weights
 // against outliers. `observations` may be in any order; dark and saturated colors are ignored.
-// Gains are 1 and vignetting is 0 without observations.
+// `photos` is the number of photographs. Without observations, gains are 1 and vignetting is 0.
 TextureExposure estimate_exposure(std::span<const ColorObservation> observations,
                                   std::size_t photos, const ExposureOptions& options);
 
 // Assigns one photograph to each triangle: good views with short seams between them.
 //
-// The energy is that of Lempitsky and Ivanov 2007 (equation 1): the loss of view quality against
-// the best view of each triangle, plus the length of the seams. It is minimized by exact dynamic
-// programming over forests of triangles while all other triangles keep their labels (block
-// coordinate descent as in Thuerck et al. 2016, "A Fast, Massively Parallel Solver for Large,
-// Irregular Pairwise Markov Random Fields"), alternating with forests of regions of one photograph.
-// No step increases the energy.
+// The energy is that of Lempitsky and Ivanov 2007 (equation 1): the loss of view quality relative
+// to each triangle's best view, plus the cost of the seams. A seam is an edge between triangles of
+// different photographs. The energy is minimized by exact dynamic programming over forests of
+// triangles while all other triangles keep their photographs (block coordinate descent as in
+// Thuerck et al. 2016, "A Fast, Massively Parallel Solver for Large, Irregular Pairwise Markov
+// Random Fields"), alternating with forests of regions of one photograph.
 
 constexpr std::uint32_t no_photo = 0xffffffff;
 
 struct LabelingOptions {
-  // Cost of a seam of 1 m: as much as this area (m2) at half of the best quality.
+  // >= 0: cost of 1 m of seam, as the area (m2) at half of the best quality that costs the same.
   double seam_cost_m = 0.1;
 };
 
@@ -85,8 +85,8 @@ struct TextureLabels {
   std::vector<std::uint32_t> photos;  // one per triangle; no_photo if no photograph sees it
   double energy_before = 0.0;         // m2, with the best view for every triangle
   double energy = 0.0;                // m2, with `photos`
-  double seams_before_m = 0.0;        // length of edges between triangles of different photographs
-  double seams_m = 0.0;               // length of these edges with `photos`
+  double seams_before_m = 0.0;        // length of the seams with the best view for every triangle
+  double seams_m = 0.0;               // length of the seams with `photos`
 };
 
 // Minimizes the energy. `opposite` has one entry per half-edge, `views` one row per triangle.
@@ -102,7 +102,7 @@ struct BlendingWeight {
 };
 
 // Blending weights of all vertices: vertex v has weights[first[v]] to weights[first[v + 1] - 1],
-// which sum up to 1. A vertex without weights uses the photograph of the triangle.
+// with a sum of 1. Without weights at a vertex, a triangle's own photograph is used there.
 struct BlendingWeights {
   std::vector<BlendingWeight> weights;
   std::vector<std::uint32_t> first;
@@ -117,12 +117,11 @@ struct TexturePaint {
   const TexturePhotos& photos;
   const TextureExposure& exposure;
   const BlendingWeights& weights;
-  Color neutral{};  // of triangles without a photograph
+  Color neutral{};  // color of triangles without a photograph
 };
 
 // Paints all charts of `atlas` into the pages of `model`, the result of atlas.make_model. Texels
-// outside all triangles get the color of the nearest triangle of the chart. Independent of the
-// number of threads.
+// outside all triangles get the color of the chart's nearest triangle. Independent of thread count.
 void paint_texture(const TextureAtlas& atlas, const TexturePaint& paint, TexturedMesh& model,
                    Progress& progress);
 

@@ -1,4 +1,4 @@
-// Visibility of triangles and vertices in photographs, with quality. Private to libmap/texture.
+// Finds and rates the photographs that see each triangle and vertex. Private to libmap/texture.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,19 +14,19 @@
 namespace libmap {
 
 struct TextureViewOptions {
-  double max_incidence_deg = 85.0;  // between the ray and the normal; > 0, < 90
-  // Photographs in which a triangle's center has a larger z are not used for it. The default is the
-  // maximum depth of fusion. 0: no limit.
+  double max_incidence_deg = 85.0;  // > 0, < 90: maximum angle between ray and normal
+  // >= 0: a photograph is not used for triangles whose center has a larger z in its camera frame.
+  // The default is the maximum depth of fusion. 0: no limit.
   double max_depth_m = 4.0;
-  // A surface further behind another than this is occluded. Covers errors of mesh and poses.
+  // >= 0: a surface farther than this behind another is occluded. Covers errors of mesh and poses.
   double occlusion_tolerance_m = 0.01;
-  int border_px = 3;  // width of the unused border of each photograph
-  // Views this near to an occluder's silhouette get a low quality (pose errors, mixed pixels).
+  int border_px = 3;  // >= 0: width of the unused border of each photograph
+  // >= 0: views this near to an occluder's silhouette get low quality (pose errors, mixed pixels).
   int occlusion_margin_px = 3;
 };
 
 struct ViewQuality {
-  std::uint32_t photo = 0;
+  std::uint32_t photo = 0;  // index of the photograph
   // Pixels per square meter of the surface, times factors <= 1 for slant and the photograph's
   // border, and the photograph's sharpness.
   float quality = 0.0F;
@@ -36,14 +36,14 @@ struct ViewQuality {
 class ViewTable {
  public:
   ViewTable() = default;
-  // At most `capacity` views per row.
+  // Keeps at most `capacity` views per row.
   ViewTable(std::size_t rows, std::size_t capacity);
 
   std::size_t rows() const { return counts_.size(); }
   std::span<const ViewQuality> operator[](std::size_t row) const {
     return {entries_.data() + row * capacity_, counts_[row]};
   }
-  // Different rows may be filled from several threads.
+  // Adds a view, or drops it if the row is full of better views. Threads may fill different rows.
   void insert(std::size_t row, ViewQuality view);
 
  private:
@@ -56,32 +56,32 @@ class ViewTable {
 struct ColorObservation {
   std::uint32_t vertex = 0;  // index among the observed vertices
   std::uint32_t photo = 0;
-  float x = 0.0F;  // pixel
-  float y = 0.0F;
+  float x = 0.0F;        // pixel column
+  float y = 0.0F;        // pixel row
   float radius2 = 0.0F;  // squared distance from the image center, 1 in the corners
   Eigen::Vector3f color = Eigen::Vector3f::Zero();  // 0 to 255
 };
 
 // Part of the mesh and number of views to find.
 struct TextureViewRequest {
-  // Views of the first `triangles` triangles and of the vertices of these triangles are found. The
-  // other triangles are occluders, and contribute to the quality of common vertices.
+  // Views of the first `triangles` triangles and of their vertices are found. The other triangles
+  // are only occluders, and contribute to the quality of common vertices.
   std::size_t triangles = 0;
   // Maximum number of views; both 0: no views, which takes much less time.
   std::size_t views_per_triangle = 0;
   std::size_t views_per_vertex = 0;
-  std::size_t observed_vertices = 0;  // approximate number, exceeded at most twofold; 0: none
+  std::size_t observed_vertices = 0;  // approximate number (at most twice as many); 0: none
 };
 
 struct TextureViews {
   // One row per triangle: photographs that see it completely.
   ViewTable of_triangles;
-  // One row per vertex up to the last one of the requested triangles: photographs that see all
-  // triangles of the vertex, with the minimum quality. Empty for vertices of other triangles only.
+  // One row per vertex up to the last vertex of the requested triangles: photographs that see all
+  // triangles of the vertex, with the minimum quality. Rows of other vertices are empty.
   ViewTable of_vertices;
-  // All views of a subset of vertices, spread over the requested triangles. Colors are not set yet.
+  // All views of a subset of vertices, spread over the requested triangles, without colors.
   std::vector<ColorObservation> observations;
-  std::size_t observed_vertices = 0;  // number of vertices in `observations`' numbering
+  std::size_t observed_vertices = 0;  // number of observed vertices (ColorObservation::vertex)
 };
 
 // Sets radius2 and color of all observations. Decodes each photograph once.

@@ -1,8 +1,8 @@
 // Reads and writes textured meshes.
 //
 // .obj: MODEL.obj, MODEL.mtl and one image per page, MODEL_0.png ...; coordinates are doubles.
-// .glb: glTF 2.0 in one file with its images, unlit (KHR_materials_unlit), float32. glTF is y-up
-// and this project z-up: writing and reading rotate the mesh about x.
+// .glb: glTF 2.0 in one file with its images, unlit (KHR_materials_unlit), float32. Up is y in glTF
+// and z in this project, so writing and reading rotate the mesh about x.
 //
 // Vertex normals are kept; vertex colors and fields are not. float32 has 24 bits of precision; for
 // meshes far from the origin see mesh_io.h.
@@ -23,7 +23,7 @@ struct TexturedMeshWriteOptions {
   int jpeg_quality = 92;  // 1 to 100
 };
 
-// Additional files of a model with one page (image and material); empty for .glb.
+// Returns the additional files of a model with one page (image and material); empty for .glb.
 std::vector<std::filesystem::path> additional_model_files(const std::filesystem::path& model,
                                                           const TexturedMeshWriteOptions& options);
 
@@ -33,7 +33,7 @@ struct ModelFile {
   std::function<void(const std::filesystem::path& temporary)> write;
 };
 
-// Path of a page's image beside the model, e.g. MODEL_0.png for MODEL.obj.
+// Returns the path of a page's image beside the model, e.g. MODEL_0.png for MODEL.obj.
 std::filesystem::path texture_page_path(const std::filesystem::path& model, std::size_t page,
                                         ImageFormat format);
 
@@ -45,8 +45,9 @@ std::vector<ModelFile> textured_mesh_files(const std::filesystem::path& path,
                                            const TexturedMesh& model,
                                            const TexturedMeshWriteOptions& options = {});
 
-// Throws Error unless the extension is .obj or .glb.
+// Throws Error if is_textured_format(path) is false.
 void require_textured_format(const std::filesystem::path& path);
+// Returns true if the extension is .obj or .glb.
 bool is_textured_format(const std::filesystem::path& path);
 
 // Reads an .obj or .glb from any program with textures (PNG or JPEG, embedded or in separate

@@ -1,5 +1,4 @@
-// Draws shapes, text and images with Cairo, as pixels or SVG. Coordinates: pixels from the top
-// left.
+// Draws shapes, text and images with Cairo, as pixels or SVG. Coordinates: px from the top left.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,20 +13,20 @@ struct _cairo;
 
 namespace libmap {
 
-enum class TextAlign { left, center, right };  // part of the text at the given position
+enum class TextAlign { left, center, right };  // part of the text that is at the given position
 
 struct TextStyle {
   int size_px = 12;
   bool bold = false;
   Color color{25, 28, 32};
   TextAlign align = TextAlign::left;
-  bool upward = false;  // reads from bottom to top
+  bool upward = false;  // true: the text is rotated and reads from bottom to top
 };
 
-// Width and line height of `text` in pixels. Throws Error (failed) if the font is not installed.
+// Returns width and line height of `text`, px. Throws Error (failed) if the font is not installed.
 Eigen::Vector2d text_size(const std::string& text, const TextStyle& style);
 
-// `text`, or its longest prefix with "..." at most `width_px` wide; empty if "..." is wider.
+// Returns `text` if at most `width_px` wide, else a prefix and "..."; empty if "..." is wider.
 std::string shortened_text(const std::string& text, const TextStyle& style, double width_px);
 
 // Output of a canvas: an image or an SVG document.
@@ -50,8 +49,7 @@ class Canvas {
                double opacity = 1.0);
   // `position` is the left end, center or right end of the text, at half of the letters' height.
   void text(const Eigen::Vector2d& position, const std::string& text, const TextStyle& style);
-  // Draws an image scaled to `rect`. Pixels are unchanged if `rect` has integer edges and the
-  // image's size.
+  // Draws an image scaled to `rect`; unchanged if `rect` has integer edges and the image's size.
   void image(const ColorImage& image, const PixelRect& rect);
   // Restricts drawing by `body` to `rect`.
   template <typename Body>
@@ -61,10 +59,10 @@ class Canvas {
     end_clip();
   }
 
-  // Result in CanvasFormat::pixels. Throws Error (failed) if Cairo reports an error.
+  // Returns the image, for CanvasFormat::pixels. Throws Error (failed) if Cairo reports an error.
   ColorImage pixels() const;
-  // Result in CanvasFormat::svg; may be called once. Text is stored as outlines; <title> and <desc>
-  // contain the given texts. Throws Error (failed) if Cairo reports an error.
+  // Returns the SVG document, for CanvasFormat::svg; may be called once. Text is stored as
+  // outlines; <title> and <desc> contain the arguments. Throws Error (failed) as pixels() does.
   std::string svg(const std::string& title, const std::string& description);
 
  private:

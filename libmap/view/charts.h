@@ -51,7 +51,7 @@ struct Chart {
   void check() const;
 };
 
-// Range of an axis, low and high: the given one, or round numbers around the data and `values`.
+// Returns low and high end of an axis: ChartAxis::range, or round numbers around data and `values`.
 std::pair<double, double> x_range(const Chart& chart, std::vector<double> values = {});
 std::pair<double, double> y_range(const Chart& chart, std::vector<double> values = {});
 
@@ -60,8 +60,7 @@ struct ChartSize {
   int height_px = 700;
 };
 
-// Draws the chart as an image. Throws Error as Chart::check does, and if a side is not between 200
-// and 16384 pixels.
+// Draws the chart as an image. Throws Error as Chart::check, and for a side not in 200 to 16384 px.
 ColorImage draw_chart(const Chart& chart, const ChartSize& size = {});
 
 // Draws the chart as SVG. Text is stored as outlines, so that it looks the same in all viewers.
@@ -74,11 +73,11 @@ Chart roc_chart(std::vector<ChartCurve> curves, const std::string& title);
 // Size for a square ROC chart.
 inline constexpr ChartSize roc_chart_size{900, 900};
 
-// Round numbers within [low, high], at most `max_ticks` + 1, with a step of 1, 2 or 5 times a power
-// of ten. Empty unless low < high.
+// Returns round numbers within [low, high], at most `max_ticks` + 1, with a step of 1, 2 or 5 times
+// a power of ten. Empty if low >= high.
 std::vector<double> round_ticks(double low, double high, int max_ticks);
 
-// Formats ticks with the same number of decimals.
+// Formats ticks, all with the same number of decimals.
 std::vector<std::string> tick_texts(const std::vector<double>& ticks);
 
 }  // namespace libmap

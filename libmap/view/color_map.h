@@ -14,20 +14,19 @@
 
 namespace libmap {
 
-// automatic: the texture if there is one; else the given field; else "hold_probability" or "score"
+// automatic: the texture if there is one; else Coloring::field; else "hold_probability" or "score"
 //   as in mode score; else own colors unless all are equal; else height.
 // own:    colors stored in the data.
-// score:  the seven classes of the graspability map's legend.
+// score:  a field from 0 to 1 in the seven classes of the graspability map's legend.
 // field:  any scalar field, or "x", "y", "z", on a color scale.
-// flags:  convex points blue, intersection ("graspable") dark green, obstacles (1 steep face, 2 out
-//   of reach) brown and ochre if there is such a field, all other points light gray.
+// flags:  by the fields "convex" (blue), "graspable" (dark green) and, if it exists, "obstacle"
+//   (1: steep face, brown; 2: out of reach, ochre); all other points light gray.
 // height: z in the terrain frame on a color scale.
 // single: one color.
 // texture: texture of a textured mesh.
 enum class ColorMode { automatic, own, score, field, flags, height, single, texture };
 
-// Color scale of continuous values. diverging: blue below and red above a gray center, for signed
-// values.
+// Color scale of continuous values. diverging: blue, gray at the center, red; for signed values.
 enum class ColorScale { viridis, diverging };
 
 // A color of a legend and the meaning of the color.
@@ -54,11 +53,11 @@ struct Legend {
 
 struct Coloring {
   ColorMode mode = ColorMode::automatic;
-  std::string field{};                     // mode `field`; replaces "score" in mode `score`
-  std::optional<double> load_n{};          // load of hold_probability, for the legend
+  std::string field{};                     // mode `field`; mode `score` (empty: "score")
+  std::optional<double> load_n{};          // load of the field hold_probability, N, for the legend
   ColorScale scale = ColorScale::viridis;  // modes `field` and `height`
-  // Values at the ends of the scale. If equal: the 2nd and 98th percentile of the data; for the
-  // diverging scale plus and minus the 98th percentile of the absolute values.
+  // Values at the ends of the scale. If equal: the 2nd and 98th percentile of the data (minimum and
+  // maximum if these are equal); for diverging, +- the 98th percentile of the absolute values.
   double range_min = 0.0;
   double range_max = 0.0;
   // Points with smaller z are white in the modes score, field, flags and height.
@@ -83,11 +82,11 @@ struct ColoredPoints {
   Legend legend;
 };
 
-// Colors all points. Throws Error if a field is missing (with the nearest known one) or has a wrong
-// length, the range descends or is not finite, mode `own` has no colors, or a color is invalid.
+// Colors all points. Throws Error if a field is missing (naming a similar field) or has a wrong
+// length, the range is descending or not finite, mode `own` has no colors, or a color is invalid.
 ColoredPoints color_points(const ColorSource& source, const Coloring& coloring);
 
-// Legend of the classes of core/score_color.h.
+// Returns the legend of the classes of core/score_color.h.
 Legend score_legend();
 
 // viridis (S. van der Walt and N. Smith, 2015, CC0) at t in 0..1, clamped; NaN is gray.
@@ -99,7 +98,7 @@ Color diverging(double t);
 Color color_at(ColorScale scale, double t);
 
 // Parses "#rrggbb", or white, black, gray, light-gray, dark-gray, red, green, blue, yellow, orange.
-// Throws Error naming `field`.
+// Throws Error, which names `field`, for any other text.
 Color parse_color(std::string_view text, const std::string& field);
 
 inline constexpr Color convex_color{40, 90, 220};

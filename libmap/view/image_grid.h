@@ -23,18 +23,18 @@ struct SheetCell {
   ColorImage image{};
 };
 
-// Group of scenes with the same view extent: the whole sheet, or each row.
+// Group of scenes that are drawn with the same view and extent: the whole sheet, or each row.
 enum class SharedView { sheet, row };
 
 struct ImageGridOptions {
-  int columns = 0;  // 0: minimum number with a page at least as wide as high
+  int columns = 0;  // 0: minimum number for which the page is at least as wide as high
   int cell_width_px = 480;
   int cell_height_px = 0;                  // 0: from the aspect ratio of the cells' content
   std::string title;                       // above all; empty: none
   std::vector<std::string> column_titles;  // above the columns; may be empty
   std::vector<std::string> row_titles;     // before the rows; may be empty
   SharedView shared_view = SharedView::sheet;
-  std::string background = "#5f6b7a";  // of scenes
+  std::string background = "#5f6b7a";  // behind scenes: "#rrggbb" or a name
   bool scale_bar = true;
   std::vector<Legend> legends;  // shown before the legends of the scenes
 };
@@ -51,7 +51,7 @@ struct SheetLayout {
   std::vector<PixelRect> captions;  // below the cells; empty if no cell has a caption
   std::vector<PixelRect> column_titles;
   std::vector<PixelRect> row_titles;
-  std::vector<PixelRect> scale_bars;  // one per row, or one, or none
+  std::vector<PixelRect> scale_bars;  // SharedView::row: one per row; otherwise one; may be empty
 };
 
 // Plans the layout. `aspect` is height / width of a cell, used if the options do not set the

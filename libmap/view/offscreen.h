@@ -26,9 +26,8 @@ class VirtualDisplay {
   VirtualDisplay(const VirtualDisplay&) = delete;
   VirtualDisplay& operator=(const VirtualDisplay&) = delete;
 
-  // True if an Xvfb was started; process id of this Xvfb, 0 if none.
-  bool started() const { return server_ > 0; }
-  int process_id() const { return server_; }
+  bool started() const { return server_ > 0; }  // true if an Xvfb was started
+  int process_id() const { return server_; }    // process id of this Xvfb; 0: none
 
  private:
   void start();

@@ -43,25 +43,25 @@ struct CameraPlacement {
 };
 
 struct SceneCamera {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::UnitX();
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // in the frame of the points, m
+  Eigen::Vector3d right = Eigen::Vector3d::UnitX();    // unit vector, like `up` and `forward`
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();
   Eigen::Vector3d forward = -Eigen::Vector3d::UnitZ();
   bool perspective = false;  // false: orthographic
   double scale_px = 1.0;     // orthographic: pixels per meter; perspective: focal length in pixels
   PixelRect plot;            // part of the image that shows the scene, centered on the optical axis
 
-  // Depth in meters; negative behind the camera.
+  // Depth along `forward`, m; negative behind the camera.
   double depth_of(const Eigen::Vector3d& point) const { return (point - position).dot(forward); }
   double pixels_per_m(double depth_m) const { return perspective ? scale_px / depth_m : scale_px; }
   // Pixel relative to the image's top left corner. In perspective, the depth must be positive.
   Eigen::Vector2d pixel_of(const Eigen::Vector3d& point) const;
 };
 
-// Camera whose `plot` contains all `points` (at least one, all finite) with a radius of `radius_m`
-// and a border of a twentieth of the plot on each side. Viewpoint::camera has the pose of
-// `placement`. Throws Error if that position and focal point coincide, `up` is parallel to the
-// view, or the field of view is out of range.
+// Returns the camera whose `plot` contains all `points` (at least one, all finite) with a radius of
+// `radius_m` and a border of a twentieth of the plot on each side. Viewpoint::camera has the pose
+// of `placement` instead, and throws Error if its position and focal point coincide, its `up` is
+// parallel to the view, or its field of view is out of range.
 SceneCamera fit_camera(Viewpoint view, const CameraPlacement& placement,
                        const std::vector<Eigen::Vector3d>& points, double radius_m,
                        const PixelRect& plot);

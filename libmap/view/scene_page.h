@@ -13,12 +13,12 @@
 
 namespace libmap {
 
-inline constexpr int max_side_px = 16384;  // of an image
-inline constexpr int min_font_px = 10;
+inline constexpr int max_side_px = 16384;  // maximum width and height of an image
+inline constexpr int min_font_px = 10;     // minimum font size
 
 struct ScenePage {
   PixelRect plot;                  // whole pixels
-  std::optional<PixelRect> title;  // nullopt: omitted, like the following
+  std::optional<PixelRect> title;  // nullopt here and in the next three fields: omitted
   std::optional<PixelRect> legend;
   std::optional<PixelRect> axes;
   std::optional<PixelRect> scale_bar;
@@ -30,12 +30,12 @@ struct ScenePage {
 // least half of the width and 0.55 of the height.
 ScenePage plan_page(const SceneViewOptions& options, const std::vector<Legend>& legends);
 
-// Largest length of 1, 2 or 5 times a power of ten meters that is at most `longest_m`.
+// Returns the largest length of 1, 2 or 5 times a power of ten meters that is at most `longest_m`.
 double round_length_m(double longest_m);
-// A length with unit, e.g. "50 m", "2 cm", "5 mm".
+// Returns a length with its unit as text, e.g. "50 m", "2 cm", "5 mm".
 std::string length_text(double length_m);
 
-// Width and height in pixels of legends in one column.
+// Returns width and height, px, of legends that are drawn in one column.
 Eigen::Vector2d legends_size(const std::vector<Legend>& legends, int font_px);
 
 // Draw title, legends and axes into the page's rectangles, if the page has these.
@@ -53,19 +53,18 @@ struct LabelRequest {
 };
 
 // Returns one box per request, in the order of the requests: beside the point, or farther away if
-// there is no room. Boxes do not overlap the points (of radius `point_radius_px`) or each other and
-// are inside `bounds`; else the area that overlaps or is outside `bounds` is minimized.
+// there is no room. Boxes are inside `bounds` and do not overlap each other or the points (discs
+// of radius `point_radius_px`); else, the area that overlaps or is outside is minimized.
 std::vector<PixelRect> place_labels(const std::vector<LabelRequest>& requests,
                                     double point_radius_px, const PixelRect& bounds);
 
 // Draws markers in the terrain frame. Labels are omitted if the plot is too small for all labels.
-// If there are more than 5000 markers, markers with drawn labels are drawn, and one per verdict and
-// pixel square (side: the disc's radius).
+// With more than 5000 markers, only labeled markers and one other marker per verdict and square of
+// the image (side: radius of a disc) are drawn.
 void draw_markers(const ScenePage& page, const SceneCamera& camera,
                   const std::vector<Marker>& markers, Canvas& canvas);
 
-// Draws dimension lines in the terrain frame. The text is above a horizontal line and to the right
-// of a vertical one.
+// Draws dimension lines in the terrain frame. Text is above a horizontal line, right of a vertical.
 void draw_dimension_lines(const ScenePage& page, const SceneCamera& camera,
                           const std::vector<DimensionLine>& lines, Canvas& canvas);
 

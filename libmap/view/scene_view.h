@@ -41,7 +41,7 @@ struct SceneLayer {
 // Binds all fields except the shape, the zero plane and the legend of own colors.
 void bind(ParameterTable& table, SceneLayer& layer);
 
-// Verdict on a marked location; the markers are dark, green or red, in this order.
+// Verdict on a marked location. Markers are dark (none), green (pass) or red (fail).
 enum class Verdict { none, pass, fail };
 
 // A labeled point, drawn over the scene. Markers outside of the view are omitted.
@@ -60,7 +60,7 @@ struct DimensionLine {
 };
 
 struct Scene {
-  std::vector<SceneLayer> layers;  // all in the scene's frame, meters
+  std::vector<SceneLayer> layers;  // in the scene frame, meters
   std::vector<Marker> markers;
   std::vector<DimensionLine> dimension_lines{};
   // Views, axes, heights, the zero plane and cubes refer to the terrain frame.
@@ -71,41 +71,38 @@ struct SceneViewOptions {
   int width = 1600;   // pixels, 1 to 16384
   int height = 1200;  // pixels, 1 to 16384
   Viewpoint view = Viewpoint::top;
-  CameraPlacement camera;  // for Viewpoint::camera, in the scene's frame
+  CameraPlacement camera;  // for Viewpoint::camera, in the scene frame
   std::string title;       // empty: none
   bool axes = true;
   bool scale_bar = true;
   bool legend = true;
   int font_px = 0;                     // font size, pixels; 0: from the image size
   std::string background = "#5f6b7a";  // behind the scene: "#rrggbb" or a name
-  // Box that the view is fitted to, meters in the terrain frame, for equal views of several scenes;
-  // default: the bounding box of the scene.
+  // Box to which the view is fitted, meters in the terrain frame, for equal views of several
+  // scenes; nullopt: the bounding box of the scene.
   std::optional<Bounds3d> extent{};
-  // Title, legend, axes and scale bar are beside the scene. They are omitted if the image is too
-  // small.
+  // Title, legend, axes and scale bar are beside the scene; a small image omits them.
 };
-// Bind the keys for all images, and the keys for images of a single scene: size, legend and axes.
+// Binds the keys for all images.
 void bind(ParameterTable& table, SceneViewOptions& options);
+// Binds the keys for images of a single scene: size, legend and axes.
 void bind_single(ParameterTable& table, SceneViewOptions& options);
 
 // Renders `scene`; equal scenes and options give equal bytes on one machine. Clouds and meshes are
 // freed after preparation. Each call starts a VirtualDisplay if no display answers; create one
 // before several calls to start it once. Calls from several threads are serialized. Throws Error as
 // color_points does, and if there is nothing to draw, a size, a color or the camera is invalid, or
-// arrays of a layer are inconsistent; Error (failed) if rendering is not possible.
+// arrays of a layer are inconsistent. Throws Error (failed) if rendering is not possible.
 ColorImage render_scene(Scene scene, const SceneViewOptions& options);
 
-// Bounding box of a scene in the terrain frame, including the size of points, and the distinct
-// legends of the layers. Throws Error as render_scene does.
 struct SceneContents {
-  Bounds3d extent;
-  std::vector<Legend> legends;
+  Bounds3d extent;              // bounding box in the terrain frame, with the size of points
+  std::vector<Legend> legends;  // distinct legends of the layers
 };
-SceneContents contents_of(const Scene& scene);
+SceneContents contents_of(const Scene& scene);  // throws Error as render_scene does
 
-// Camera that render_scene uses: camera.pixel_of(terrain_from_scene * point) is the pixel of a
-// point and camera.plot the part of the image with the scene. Requires no display. Throws Error as
-// render_scene does.
+// Returns the camera that render_scene uses: camera.pixel_of(terrain_from_scene * point) is the
+// pixel of a point of the scene. Requires no display. Throws Error as render_scene does.
 SceneCamera camera_of(const Scene& scene, const SceneViewOptions& options);
 
 }  // namespace libmap
