@@ -147,8 +147,8 @@ std::size_t evaluate_obstacles(const ObstacleOptions& options, GraspabilityMap& 
 void bind(libmap::ParameterTable& table, DetectionOptions& options) {
   bind(table, options.scenario);
   table.add("plane", options.plane, {{"fit", PlaneSource::fit}, {"none", PlaneSource::none}},
-            "frame in which the terrain is scored; fit: frame of the regression plane of the "
-            "points; none: frame of the cloud");
+            "terrain frame, whose z is up; fit: frame of the plane fitted to the cloud; none: "
+            "frame of the cloud");
 }
 
 Gripper gripper_of(const DetectionOptions& options) {

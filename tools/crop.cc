@@ -306,7 +306,7 @@ int main(int argc, char** argv) {
   command.input("MAP", options.input,
                 "mesh (.ply .obj .stl .tif ...), a folder of its tiles, or cloud (.pcd .ply .csv)");
   command.output(options.output,
-                 "cropped mesh or cloud (transform: STEM.site_from_map.txt), or folder of tiles");
+                 "cropped mesh, cloud or folder of tiles, with STEM.site_from_map.txt (transform)");
   command.option("--box", "XMIN,YMIN[,ZMIN],XMAX,YMAX[,ZMAX]", options.box,
                  "box to keep, m (its frame: --frame)");
   command.option("--polygon", "FILE.csv", options.polygon,

@@ -28,9 +28,9 @@ struct PanoramaCommandOptions {
 
 void bind(libmap::ParameterTable& table, PanoramaCommandOptions& options) {
   table.add("stamp_s", options.stamp,
-            "stamp of the set of images to fuse, s; fullest: the set with most cameras");
+            "time stamp of the image set to fuse, s; fullest: set with images of most cameras");
   table.add("tolerance_s", options.tolerance_s, libmap::not_negative,
-            "maximum difference between the stamps of an image and its set, s");
+            "maximum difference between the time stamps of an image and its image set, s");
   table.add("strict", options.strict, "fail if a camera has no usable image, instead of a warning");
   bind(table, options.panorama);
 }

@@ -256,7 +256,7 @@ void bind_points(libmap::ParameterTable& table, SceneFileOptions& options) {
             "column of names of marked locations; auto: first column, unless it is x, y or z; "
             "none: no names");
   table.add("verdict", options.verdict,
-            "column of the verdicts of marked locations; 1: green; 0: red; empty: neutral");
+            "column that colors the marked locations; 1: green; 0: red; empty: neutral color");
   table.add("points_frame", options.points_frame, listed_point_frame_names(),
             "frame of the marked locations; input: scored cloud; terrain: terrain frame; map: "
             "cloud or mesh before `graspmap crop`; auto: by the locations' manifest, else input");

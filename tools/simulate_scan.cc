@@ -69,7 +69,7 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
             "format of color images; jpeg: lossy; png: lossless");
   table.add("seed", simulation.seed, libmap::not_negative, "random seed of the scan");
   table.add("rock_seed", simulation.rock_seed, libmap::not_negative,
-            "random seed of the rock's colors, to be equal for all scans of one ground; 0: --seed");
+            "random seed of the rock texture, equal for all scans of one ground; 0: as --seed");
 }
 
 void add_results(const libmap::ScanSimulationResult& result, Run& run) {

@@ -49,12 +49,12 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
   table.add("square_noise", planes.noise.axial_of_square, not_negative,
             "standard deviation of depth: term proportional to squared range, 1/m");
   table.add("lateral_noise_px", planes.noise.lateral_px, not_negative,
-            "standard deviation of measurements across the line of sight, pixels");
+            "standard deviation of a measurement perpendicular to the line of sight, pixels");
   table.add("plane_radius_px", planes.radius_px, {1, 7},
-            "radius of the disc of pixels to which a plane is fitted, pixels");
+            "radius of the disc around a pixel in which a plane is fitted, pixels");
   table.add_former_key("min_pair_share", "min_pair_fraction");
   table.add("min_pair_fraction", planes.min_pair_fraction, zero_to_one,
-            "minimum share of pairs of opposite neighbors that agree with a pixel, to fit a plane");
+            "minimum share of opposite pixel pairs that agree with a pixel, to fit a plane there");
   table.add("disc_radius_voxels", options.disc_radius_voxels, positive,
             "radius of the disc around a point in which measurements are averaged, in voxels");
   table.add(

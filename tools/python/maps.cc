@@ -25,7 +25,7 @@ struct ScoreOptions {
 void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   libgtd::bind(table, options.detection);
   table.add("frame", options.frame, libgtd::map_frame_names(),
-            "frame of the map's points; terrain: terrain frame; input: frame of the scored cloud");
+            "frame of the map's points; terrain: as set by --plane; input: frame of the cloud");
 }
 
 ScoreOptions score_options(const std::optional<std::string>& scenario,
