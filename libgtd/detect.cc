@@ -250,9 +250,9 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
             "number of scored voxels at the border of the terrain");
   table.add("curvature_points", result.curvature_points,
             "number of points at which the curvature was estimated");
-  table.add("convex_points", result.convex_points, "number of points on convex ground");
+  table.add("convex_points", result.convex_points, "number of curvature points on convex ground");
   table.add("graspable_voxels", result.graspable_voxels, "number of graspable voxels");
-  table.add("normal_radius_m", result.normal_radius_m, "radius of the surface normal fits, m");
+  table.add("normal_radius_m", result.normal_radius_m, "radius within which normals are fitted, m");
   table.add("unoriented_voxels", only_if(result.map.content.normals, result.unoriented_voxels),
             "number of voxels without a normal, scored with an upright mask");
   table.add("obstacle_voxels", only_if(result.map.content.obstacles, result.obstacle_voxels),

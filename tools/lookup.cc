@@ -26,11 +26,10 @@ struct LookupCommandOptions {
 
 void bind(libmap::ParameterTable& table, LookupCommandOptions& options) {
   bind(table, options.lookup);
-  table.add(
-      "points_frame", options.points_frame, listed_point_frame_names(),
-      "frame of the points; input: scored cloud; terrain: terrain frame; map: cloud or mesh "
-      "before `graspmap crop`, or mesh of a simulated robot; auto: by the manifest of POINTS, "
-      "else input");
+  table.add("points_frame", options.points_frame, listed_point_frame_names(),
+            "frame of POINTS; input: frame of the scored cloud; terrain: frame of scoring, z up; "
+            "map: frame before `graspmap crop`, or of a simulated robot's mesh; auto: from the "
+            "manifest of POINTS, else input");
   table.add("column", options.columns,
             "columns to add, separated by commas: NAME=FIELD (field of the map), or "
             "NAME=FIELD>=VALUE (1 or 0); empty: found, distance_m and all fields");

@@ -112,7 +112,7 @@ void describe(ResultTable& table, const RefinementResult& result) {
   table.add("sensor", sensor, "findings about the sensor, such as calibration errors");
   table.add("noise", result.noise, "depth noise and its source");
   table.add("scale", result.scale, "source and uncertainty of the scale");
-  table.add("rejected_stages", rejected, "number of rejected stages");
+  table.add("rejected_stages", rejected, "number of rejected refinement stages");
   table.add("trajectory_rmse_m", rmse_m, "absolute trajectory error against true poses (RMS), m");
   table.add("trajectory_rotation_error_deg", rotation_deg,
             "mean rotation error against true poses, degrees");

@@ -302,7 +302,7 @@ void describe(ResultTable& table, const TextureCounts& counts) {
             "number of triangles without a photograph");
   table.add("seen_m2", counts.seen_m2, Merge::sum, "area with a photograph, m2");
   table.add("unseen_m2", counts.unseen_m2, Merge::sum, "area without a photograph, m2");
-  table.add("charts", counts.charts, Merge::sum, "number of charts of the texture");
+  table.add("charts", counts.charts, Merge::sum, "number of charts (pieces) of the texture");
   table.add("split_charts", counts.split_charts, Merge::sum,
             "number of charts that were split to fit a page");
   table.add("shrunk_charts", counts.shrunk_charts, Merge::sum,
@@ -312,7 +312,7 @@ void describe(ResultTable& table, const TextureCounts& counts) {
   table.add("atlas_scale", counts.atlas_scale, Merge::min,
             "factor by which the charts were scaled down to fit max_pages; 1: not scaled down");
   table.add("seams_before_m", counts.seams_before_m, Merge::sum,
-            "length of seams with the best photograph for each triangle, m");
+            "length of seams if each triangle showed its best photograph, m");
   table.add("seams_m", counts.seams_m, Merge::sum, "length of seams between photographs, m");
   table.add_hidden("texels", counts.texels, Merge::sum);
 }

@@ -134,14 +134,14 @@ void bind(ParameterTable& table, WorldOptions& options) {
 void describe(ResultTable& table, const WorldReport& report) {
   table.add("visual_triangles", report.visual_triangles, Merge::sum, "triangles of visual meshes");
   table.add("collision_triangles", report.collision_triangles, Merge::sum,
-            "triangles of the collision meshes");
+            "number of triangles of the collision meshes");
   table.add("collision_deviation_m", report.collision_deviation_m, Merge::max,
             "maximum distance between collision and visual meshes, in both directions, m");
-  table.add("field_nodes", report.field_nodes, Merge::sum, "nodes of the height fields");
+  table.add("field_nodes", report.field_nodes, Merge::sum, "number of height field nodes");
   table.add("field_deviation_m", report.field_deviation_m, Merge::max,
             "maximum distance between height fields and surface, in both directions, m");
   table.add("missing_cells", report.missing_cells, Merge::sum,
-            "cells of the height fields that balls replace");
+            "number of cells of the height fields that balls replace");
   table.add("balls", report.balls, Merge::sum, "balls that replace cells of the height fields");
   table.add("collision_bytes", report.collision_bytes, Merge::sum,
             "size of collision meshes and height fields, bytes");
