@@ -38,8 +38,8 @@ namespace py = pybind11;
 
 using Shape = std::vector<py::ssize_t>;
 
-// Returns a read-only array on memory of `owner`, which the array keeps alive. `strides` are in
-// bytes; empty: dense.
+// Returns a read-only array of the numbers at `data`, which `owner` owns and the array keeps alive.
+// `strides`: bytes per step along each axis; empty: dense, row by row.
 template <typename Number>
 py::array view(const Number* data, Shape shape, py::handle owner, Shape strides = {}) {
   py::array array(py::dtype::of<Number>(), std::move(shape), std::move(strides), data, owner);
@@ -47,13 +47,13 @@ py::array view(const Number* data, Shape shape, py::handle owner, Shape strides 
   return array;
 }
 
-// Returns a property getter for an array on a member of an object, which the array keeps alive.
+// Returns a property getter: view_of(object.*member, object), for example a call of view().
 template <typename Object, typename Member, typename ViewOf>
 auto viewing(Member Object::*member, ViewOf view_of) {
   return [=](const py::object& self) { return view_of(self.cast<Object&>().*member, self); };
 }
 
-// Returns an array with one number per item.
+// Returns the array of number_of(item) for each of `items`.
 template <typename Number, typename Items, typename NumberOf>
 py::array_t<Number> column(const Items& items, const NumberOf& number_of) {
   py::array_t<Number> array(static_cast<py::ssize_t>(items.size()));
@@ -77,7 +77,7 @@ void check_names(const std::vector<std::string>& parameters, const std::vector<s
 // Returns the bound "one of NAME NAME ...".
 std::string one_of(const std::vector<std::string>& names);
 
-// Accepted types of an array: NumPy's letters, and the size of a number in bytes (0: any).
+// Accepted types of an array: NumPy's kind letters, and the size of a number in bytes (0: any).
 struct Numbers {
   std::string_view kinds;
   py::ssize_t bytes = 0;
@@ -119,7 +119,8 @@ Options options_from(const py::dict& values, Options options = {}) {
 // Returns a dict of the results by key; a missing value is None.
 py::dict dict_of(const libmap::ResultTable& table);
 
-// Return a dict per parameter (key, type, default, choices, description) or result (not `objects`).
+// Return one dict per parameter (key, type, default, choices, description), or per result (key,
+// type, description) whose key is not in `objects`.
 py::list list_of(const libmap::ParameterTable& table);
 py::list list_of(const libmap::ResultTable& table, const std::vector<std::string>& objects);
 
@@ -129,8 +130,8 @@ struct Stage {
   std::function<py::list()> results;
 };
 std::vector<Stage>& stages();
-// Registers a stage with its options and results for the documentation and the stubs. `objects` are
-// keys of results that are objects in Python, not numbers or texts.
+// Registers a stage with its options and results for the documentation and the stubs. `objects`:
+// keys of results that Python returns as objects, not as numbers or texts.
 template <typename Options, typename... Results>
 void add_stage(const std::string& name, const std::vector<std::string>& objects = {}) {
   const auto options = [] {
@@ -147,8 +148,8 @@ void add_stage(const std::string& name, const std::vector<std::string>& objects 
   stages().push_back({name, options, results});
 }
 
-// Calls callback(stage, done, total) when a stage begins, at most ten times a second, and when it
-// ends; handles Ctrl-C. An exception of the callback ends the work.
+// Calls callback(stage, done, total) when a stage begins and ends, and between at most ten times a
+// second. An exception of the callback, or KeyboardInterrupt after Ctrl-C, ends the work.
 class CallProgress : public libmap::Progress {
  public:
   explicit CallProgress(py::object callback) : callback_(std::move(callback)) {}
@@ -167,7 +168,8 @@ class CallProgress : public libmap::Progress {
   std::chrono::steady_clock::time_point last_call_{};
 };
 
-// Calls step(progress) without the interpreter's lock, on at most `threads` threads (0: all).
+// Returns step(progress), called without the interpreter's lock on at most `threads` threads (0:
+// all processors). Throws Error for more than 4096 threads or a callback that is not callable.
 template <typename Step>
 auto run(unsigned threads, const py::object& callback, const Step& step) {
   constexpr unsigned max_threads = 4096;
@@ -210,7 +212,7 @@ std::shared_ptr<T> shared(T&& value) {
 
 py::dict numbers_of(const std::vector<std::pair<std::string, double>>& numbers);
 
-// Makes C++ errors of the libraries and the file system a graspmap.Error in Python.
+// Registers the conversion of C++ errors of libraries and file system to graspmap.Error.
 void translate_errors();
 
 // Add classes and functions to the module.
@@ -310,7 +312,7 @@ struct Argument<std::vector<Eigen::Vector3d>> {
   }
 };
 
-// Accepts any iterable except a text.
+// Converts each item of any iterable except a text.
 template <typename T>
 struct Argument<std::vector<T>> {
   static std::vector<T> from(const py::object& given, const std::string& name) {
@@ -324,7 +326,7 @@ struct Argument<std::vector<T>> {
   }
 };
 
-// Accepts None, or a T.
+// Accepts None, which becomes nullopt or nullptr, or a value of the type.
 template <typename T>
 struct Argument<std::optional<T>> {
   static std::optional<T> from(const py::object& given, const std::string& name) {
@@ -353,7 +355,7 @@ decltype(auto) call(const Function& function, const std::array<py::object, sizeo
 template <typename>
 using Given = const py::object&;
 
-// Value of a required parameter for which the call has no argument.
+// Default that marks a required parameter without an argument in the call.
 inline py::object missing_value() { return py::reinterpret_borrow<py::object>(Py_NotImplemented); }
 inline py::arg_v with_default(const py::arg& required) {
   return {required.name, missing_value(), "..."};
@@ -371,7 +373,7 @@ void check_given(const std::array<const char*, count>& names,
   check_names({names.begin(), names.end()}, unknown, missing);
 }
 
-// Returns the function with checked arguments, for pybind.
+// Wraps a function for pybind11: checks the names of the arguments and converts their values.
 template <typename Result, typename... Types>
 auto checked(Result (*function)(Types...), std::array<const char*, sizeof...(Types)> names) {
   return [=](Given<Types>... given, const py::kwargs& others) -> Result {
@@ -381,7 +383,7 @@ auto checked(Result (*function)(Types...), std::array<const char*, sizeof...(Typ
   };
 }
 
-// Returns a method with checked arguments; its object is not one of them.
+// Wraps a method likewise; `self` has no name and is not converted.
 template <typename Result, typename Self, typename... Types>
 auto checked(Result (*method)(const Self&, Types...),
              std::array<const char*, sizeof...(Types)> names) {
@@ -399,7 +401,7 @@ void define(py::module_& module, const char* name, Result (*function)(Types...),
   module.def(name, checked(function, parameters));
 }
 
-// Parameters are py::arg; those without a default value are required.
+// Each of `parameters` is a py::arg, which is required unless it has a default value.
 template <typename Class, typename Method, typename... Parameters>
 void define_method(Class& type, const char* name, Method method, const char* documentation,
                    const Parameters&... parameters) {
