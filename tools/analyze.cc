@@ -43,7 +43,7 @@ void bind_one(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind(table, options.reach);
   table.add("start", options.start,
             "start position of the robot: X,Y,Z (m) in the frame of --points-frame; largest: on "
-            "the largest region");
+            "the largest graspable region");
   bind(table, options.change);
   table.add(
       "transform", options.transform,

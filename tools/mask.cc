@@ -43,7 +43,7 @@ void bind(libmap::ParameterTable& table, MaskOptions& options) {
   table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive,
             "edge length of the voxels, m");
   table.add("extra_void_layers", options.mask.extra_void_layers, {0, 10000},
-            "number of layers without ground (H_add) that are added on top of the mask");
+            "number of layers (H_add) added on top of the mask, in which ground lowers the score");
   table.add("view", options.view, libmap::viewpoint_names(), "viewpoint, as in render --view");
   table.add("sections", options.sections, "draw three sections through the mask instead of a view");
   bind_sections(table, options);

@@ -310,7 +310,7 @@ int main(int argc, char** argv) {
   command.flag("--nodes", options.nodes, "add the node id as a ninth column of a .tum output");
   libmap::bind(command.parameters(), options.refinement);
   command.parameters().add("strict", options.strict,
-                           "fail if parts of the scan are missing, instead of warning");
+                           "fail if parts of the scan cannot be read, instead of warning");
   // Image pyramids are allocated for each frame. Returning them to the system costs 12 % of the
   // time of features.
   mallopt(M_TRIM_THRESHOLD, 1 << 28);

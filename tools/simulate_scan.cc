@@ -36,7 +36,7 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
   libmap::ScanSimulationOptions& simulation = options.simulation;
   table.add("sensor", options.sensor,
             "depth camera: a name in data/sensors or a file, from which camera, noise, range, "
-            "timing and faults are taken unless options set them; auto: the defaults");
+            "timing and faults are taken unless options set them; auto: defaults of the options");
   table.add("camera", options.camera,
             "calibration file of the camera (.yaml), or a camera of the toolkit: realsense-d435, "
             "ipad-lidar; empty: a Kinect v2, 512 x 424 pixels");

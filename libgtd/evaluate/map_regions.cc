@@ -364,7 +364,7 @@ void bind(libmap::ParameterTable& table, MapRegionOptions& options) {
   table.add("adjacency_voxels", options.adjacency_voxels, libmap::Range{1.0, 100.0},
             "maximum index difference, per axis, of connected voxels of a region; 1: 26 neighbors");
   table.add("min_voxels", options.min_voxels, libmap::Range{1.0, 1e9},
-            "minimum number of voxels of a region; smaller regions are skipped");
+            "minimum number of voxels of a graspable region; smaller regions are skipped");
 }
 
 MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,

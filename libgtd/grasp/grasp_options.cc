@@ -33,7 +33,7 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
   table.add("max_distance_m", options.max_distance_m, positive,
             "maximum distance of a tested location from the mesh, m");
   table.add("ensemble", options.ensemble,
-            "use the gripper's ensemble of parameter sets; false: the values of the gripper file");
+            "vary force parameters over the gripper's ensemble; false: values of the gripper file");
   bind(table, options.closing);
   bind(table, options.engagement);
   bind(table, options.surface);

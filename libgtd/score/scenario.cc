@@ -22,7 +22,7 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
   table.add("gripper", scenario.gripper, "gripper: scar-e, hubrobo, limbero, or a gripper file");
   table.add("voxel_size_m", scenario.voxel_size_m, positive, "edge length of the voxels, m");
   table.add("extra_void_layers", scenario.extra_void_layers, {0, 10000},
-            "number of layers without ground (H_add) that are added on top of the gripper mask");
+            "number of mask layers (H_add) added on top, in which ground lowers the score");
   table.add("solid_voxel_threshold", scenario.solid_voxel_threshold, {1, 2147483647},
             "number of ground voxels in the gripper mask (TSV) up to which the score is reduced");
   table.add("load_n", scenario.load_n, positive,

@@ -99,7 +99,7 @@ void describe(ResultTable& table, const DepthFusionResult& result) {
   table.add("registration_rounds", result.registration_rounds,
             "number of registration rounds that moved frames");
   table.add("registration_rejected", result.registration_rejected,
-            "true if a registration was not confirmed, or could not be without color");
+            "true if the registration was rejected, or could not be checked without color");
   const auto add_check = [&](const std::string& kind, const PairCosts& costs) {
     const auto if_measured = [&](double cost) {
       return costs.count > 0 ? std::optional(cost) : std::nullopt;

@@ -473,7 +473,7 @@ void bind(ParameterTable& table, PoseGraphOptions& options) {
   table.add("max_chi_square", options.max_chi_square, positive,
             "maximum chi-square of a loop closure after optimization; closures above are rejected");
   table.add("gauge_node", options.gauge_node, not_negative,
-            "id of the node whose pose is fixed; 0: the first node of each connected component");
+            "id of the node with a fixed pose; 0: first node of each pose graph component");
 }
 
 PoseGraphResult optimize_pose_graph(const std::map<int, Pose>& map_from_base,

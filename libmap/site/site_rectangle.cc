@@ -258,7 +258,7 @@ void bind(ParameterTable& table, SiteRectangleOptions& options) {
   table.add("site_cell_m", options.cell_m, positive,
             "cell size of the mask of the measured area in which the site is searched, m");
   table.add("max_gap_m", options.max_gap_m, not_negative,
-            "minimum size of a hole in the measured area: side of a square that fits into it, m");
+            "maximum size of ignored holes in the measured area: side of a square that fits in, m");
   table.add("margin_m", options.margin_m, not_negative,
             "minimum distance of the site from holes, the data's border and the border band, m");
 }
