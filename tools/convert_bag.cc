@@ -458,8 +458,8 @@ void run_bag(const BagCommandOptions& options, Run& run) {
 int graspmap_tools::convert_bag(int argc, char** argv) {
   BagCommandOptions options;
   Command command("convert",
-                  "With a ROS bag: extracts depth images or a cloud, or writes a map or a rig's "
-                  "images.");
+                  "With a ROS bag: reads depth images or a cloud from a bag, or writes a map or a "
+                  "rig's images to one.");
   command.input(
       "IN", options.input,
       "bag to read: .bag (ROS 1), .mcap, .db3 or its folder (ROS 2); for writing a bag: a map "

@@ -148,8 +148,8 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
 int graspmap_tools::fuse_rig(int argc, char** argv) {
   PanoramaCommandOptions options;
   Command command("fuse",
-                  "With the folder of a camera rig: one cloud in the robot's frame from depth "
-                  "images of the same time.");
+                  "With the folder of a camera rig: fuses depth images of the same time into one "
+                  "cloud in the robot's frame.");
   command.input("RIG_FOLDER", options.folder,
                 "folder of rig.yaml and depth images: CAMERA/STAMP.png, or as in images.csv");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");

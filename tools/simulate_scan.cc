@@ -219,7 +219,7 @@ void simulate(SimulateScanOptions& options, Run& run) {
 
 int graspmap_tools::simulate_scan(int argc, char** argv) {
   SimulateScanOptions options;
-  Command command("simulate scan", "A scan of a mesh or a terrain by a handheld depth camera.");
+  Command command("simulate scan", "Simulates a handheld depth camera on a mesh or terrain.");
   command.input("SCENE", options.scene,
                 "scene to scan: a mesh (.ply, .obj, .stl, .off, .glb), or a height field as a "
                 "cloud or a folder of clouds of any size (.pcd, .ply, .csv)");
