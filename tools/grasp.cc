@@ -359,8 +359,8 @@ int main(int argc, char** argv) {
       "file (.yaml) with fitted force parameters; with --plan: CSV of planned pull tests");
   command.option(
       "--fit", "PULLS.csv", options.pulls,
-      "table of pull tests to which the gripper's parameters are fitted; columns x, y, z (m) or "
-      "ground (level); tilt_deg, azimuth_deg; force_n at slip, or load_n and held (0 or 1)");
+      "pull tests to which force parameters are fitted: CSV with x, y, z (m) or ground = level; "
+      "tilt_deg, azimuth_deg of the pull; force_n at slip, or load_n and held (0 or 1)");
   command.option("--plan", "N", options.plan,
                  "with --points: number of most informative pull tests to plan");
   command.option("--tile", "K/N", options.tile,

@@ -416,7 +416,7 @@ void bind(ParameterTable& table, IcpOptions& options) {
             "pairs");
   table.add("icp_iterations", options.iterations, {1, 1000}, "maximum number of ICP iterations");
   table.add("icp_pairs", options.pairs_per_frame, {1, 1000},
-            "--icp global: number of most overlapping frames to which each frame is aligned");
+            "with --icp global: number of most overlapping frames to which each frame is aligned");
   table.add("icp_samples", options.samples, {1, 1000000},
             "approximate number of surface samples per frame for ICP");
   table.add(

@@ -123,7 +123,7 @@ void bind(ParameterTable& table, WorldOptions& options) {
             "maximum distance of MuJoCo's height field and balls from the surface, m");
   table.add("ball_radius_m", options.ball_radius_m, positive,
             "maximum radius of the balls that replace cells of MuJoCo's height field, m");
-  table.add("gravity", options.gravity, "downward gravity in m/s2, or of earth, moon or mars");
+  table.add("gravity", options.gravity, "downward gravity, m/s2: a number, or earth, moon or mars");
   table.add("friction", options.friction, not_negative, "coefficient of friction of the ground");
   table.add("restitution", options.restitution, zero_to_one,
             "coefficient of restitution of the ground");
