@@ -134,9 +134,8 @@ ParameterTable field_point_parameters(FieldPointOptions& options) {
   table.add("count", options.count, Range{1.0, 10'000.0}, "number of locations for the field test");
   table.add("min_height_m", options.min_height_m, not_negative,
             "minimum height of locations for the field test above the ground, m");
-  table.add(
-      "radius_m", options.radius_m, Range{0.005, 1.0},
-      "radius of the surface whose normals classify a field test location (flat, edge, ...), m");
+  table.add("radius_m", options.radius_m, Range{0.005, 1.0},
+            "radius of the surface by whose normals a location is classified (flat, edge, ...), m");
   return table;
 }
 
