@@ -23,8 +23,7 @@ Options = Mapping[str, Any] | None
 
 
 def merged(options: Options, values: Mapping[str, Any]) -> Any:
-    """Returns one dict of both; `values` take precedence. If `options` is no mapping, returns it
-    unchanged, and the extension module rejects it."""
+    """Returns one dict of both; `values` take precedence. The extension module rejects other `options`."""
     if options is None or isinstance(options, Mapping):
         return {**(options or {}), **values}
     return options

@@ -204,8 +204,7 @@ class GraspResult(Result):
     hold_low, hold_high : array, shape (N,), float64
         Limits of Wilson's 95 % interval of the probability.
     force_n : array, shape (N, 3), float64
-        Quantiles 0.1, 0.5 and 0.9 over the trials of the holding force, the minimum over the pull
-        directions, N.
+        Quantiles 0.1, 0.5 and 0.9 over the trials of the holding force in the weakest direction, N.
     force_range_n : array, shape (N, 2), float64
         Quantiles 0.05 and 0.95 of the same force, N.
     trial_spread : array, shape (N,), float64
