@@ -23,7 +23,7 @@ Options = Mapping[str, Any] | None
 
 
 def merged(options: Options, values: Mapping[str, Any]) -> Any:
-    """Returns one dict of both; `values` take precedence. The extension module rejects other `options`."""
+    """Returns one dict of both; `values` take precedence. The extension module rejects other types."""
     if options is None or isinstance(options, Mapping):
         return {**(options or {}), **values}
     return options
