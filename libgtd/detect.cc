@@ -147,8 +147,8 @@ std::size_t evaluate_obstacles(const ObstacleOptions& options, GraspabilityMap& 
 void bind(libmap::ParameterTable& table, DetectionOptions& options) {
   bind(table, options.scenario);
   table.add("plane", options.plane, {{"fit", PlaneSource::fit}, {"none", PlaneSource::none}},
-            "frame in which the terrain is scored; fit: frame of the regression plane of the "
-            "points; none: frame of the cloud");
+            "terrain frame, whose z is up; fit: frame of the plane fitted to the cloud; none: "
+            "frame of the cloud");
 }
 
 Gripper gripper_of(const DetectionOptions& options) {
@@ -250,9 +250,9 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
             "number of scored voxels at the border of the terrain");
   table.add("curvature_points", result.curvature_points,
             "number of points at which the curvature was estimated");
-  table.add("convex_points", result.convex_points, "number of points on convex ground");
+  table.add("convex_points", result.convex_points, "number of curvature points on convex ground");
   table.add("graspable_voxels", result.graspable_voxels, "number of graspable voxels");
-  table.add("normal_radius_m", result.normal_radius_m, "radius of the surface normal fits, m");
+  table.add("normal_radius_m", result.normal_radius_m, "radius within which normals are fitted, m");
   table.add("unoriented_voxels", only_if(result.map.content.normals, result.unoriented_voxels),
             "number of voxels without a normal, scored with an upright mask");
   table.add("obstacle_voxels", only_if(result.map.content.obstacles, result.obstacle_voxels),

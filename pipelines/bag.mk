@@ -1,5 +1,5 @@
-# Maps from a robot's bag: its depth images, and for each synchronized set of images a panorama, a
-# graspability map, footholds, an image, and a bag for RViz.
+# Graspability maps from a robot's bag. Results: the depth images of the bag; for each synchronized set
+# of images, a cloud of all cameras (panorama), a map, footholds, an image, and a bag for RViz.
 #
 # BAG is a bag of ROS 1 (.bag) or ROS 2 (.mcap, or a folder of .db3). The written bags have the same
 # format: map.bag, map.mcap, or a folder map_bag.
@@ -56,7 +56,7 @@ $(OUT)/images.json: $(BAG) $(wildcard $(BAG)/*) $(OUT)/read_with
 # Bag of a map. For a folder, its manifest is the target.
 map_bag := $(if $(filter %.bag,$(BAG)),map.bag,$(if $(filter %.mcap,$(BAG)),map.mcap,map_bag.json))
 
-# Stamps of the sets, which are known only after the images exist: `all` runs a second make.
+# Stamps of the image sets. They are known only after the images exist, so `all` runs a second make.
 stamps := $(shell tail -n +2 $(firstword $(wildcard $(OUT)/images/synchronized_sets.csv $(OUT)/images/moments.csv) /dev/null) | cut -d, -f1)
 sets: $(foreach stamp,$(stamps),$(OUT)/$(stamp)/$(map_bag) $(OUT)/$(stamp)/top.png)
 moments: sets  # earlier name

@@ -4,9 +4,9 @@
 #   sudo apt install visp-images-data netpbm
 #   make -f pipelines/castle.mk OUT=folder -j2
 #
-# The scan has two cameras, because its depth must be registered to color, no poses, and the noise of a
-# short-range sensor. planes.txt compares the mesh with the planes, some of which the camera did not see.
-# The other results are those of scan.mk.
+# The scan has separate cameras for depth and color, no poses, and the noise of a short-range sensor.
+# planes.txt contains the distances of the measured planes to the mesh; the camera did not see all
+# planes. The other results are those of scan.mk.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -25,7 +25,7 @@ endif
 all: chain
 	@exec $(MAKE) --no-print-directory -f $(here)castle.mk $(OUT)/planes.txt
 
-# The file that castle.py writes last.
+# castle.py writes this file last.
 $(OUT)/map_from_planes.txt: $(here)castle.py
 	@mkdir -p $(OUT)
 	@$(here)castle.py $(CASTEL) $(OUT)

@@ -85,7 +85,7 @@ def write_scan(source, scan):
 
 
 def planes_of(cao):
-    """Returns the vertices and faces in a ViSP model file of lists, each after its number of lines."""
+    """Returns the vertices and faces of a ViSP model file: lists, each after its number of lines."""
     lines = [line.split("#")[0].split() for line in cao.read_text().splitlines()]
     lines = [line for line in lines if line and line != ["V1"]]
     blocks = []

@@ -1,5 +1,5 @@
 # Demonstration without data: rock_site.mk (from a simulated scan's database to the map),
-# primitive_shapes.mk (the thesis's shapes with known truth), and one report of both.
+# primitive_shapes.mk (shapes of known graspability), and one report of both.
 #
 #   make -f pipelines/demo.mk OUT=folder -j2
 

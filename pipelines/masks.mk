@@ -5,14 +5,14 @@
 #        [METHODS="thesis envelope climblab corrected"] [GRIPPERS="scar-e hubrobo"] -j2
 #
 # SITES are clouds, each with an optional name before a colon (default: the file's name). Without SITES,
-# the embedded scene and simulated rocks are used. SCAR-E uses the thesis's 10 mm voxels, H_add 1 and
-# TSV 120. HubRobo's voxels of 1 mm are smaller than the spacing of a site's cloud and would give 9
-# million voxels for 3 x 3 m. Here they are 5 mm, a fifth of its palm's radius, and its mask has three
-# layers. Its published H_add 3 and TSV 100 are converted to these voxels: 1 layer, and 4 of the 324
-# voxels of its window instead of 100 of 7744. Gaps between the points are interpolated. The zero plane
-# is so low that all ground counts. COUNT, EDGE and SPACING set the resolution of the simulated sites,
-# CELL the width of an image in pixels. A second run does nothing. If a variable or a file changes, the
-# results that depend on it are recomputed.
+# a scene of primitive shapes and a site of rocks are simulated; COUNT, EDGE and SPACING set their
+# resolution. CELL is the width of an image in pixels. H_add is --extra-void-layers and TSV
+# --solid-voxel-threshold of `graspmap score`. SCAR-E has the thesis's voxels of 10 mm, H_add 1 and TSV
+# 120. HubRobo's published voxels of 1 mm are smaller than the point spacing of a site. Here, they are 5
+# mm (a fifth of the palm's radius), which gives a mask of three layers. The published values are
+# converted: H_add 3 to 1, and TSV 100 (of the mask's 7744 voxels) to 4 (of 324). For HubRobo, gaps
+# between points are interpolated. The zero plane is so low that all ground counts. A second run does
+# nothing. If a variable or a file changes, the results that depend on it are recomputed.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -43,7 +43,7 @@ ifdef is_alone
 
 simulated := primitive_shapes:$(OUT)/sites/primitive_shapes.pcd rocks:$(OUT)/sites/rocks.pcd
 sites := $(or $(strip $(SITES)),$(simulated))
-# Name and cloud of a site.
+# Name and cloud of a site. Argument: an item of SITES.
 name_of = $(if $(findstring :,$(1)),$(firstword $(subst :, ,$(1))),$(basename $(notdir $(1))))
 cloud_of = $(lastword $(subst :, ,$(1)))
 names := $(foreach site,$(sites),$(call name_of,$(site)))

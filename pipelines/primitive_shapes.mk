@@ -1,6 +1,6 @@
-# Example without data: the thesis's scenario 1 (primitive shapes on a plane) is simulated without errors,
-# scored with the methods `thesis` and `corrected`, looked up at 12 locations and evaluated against their
-# expected graspability.
+# Example without data: scenario 1 of the thesis (primitive shapes on a plane). The scene is simulated
+# without errors and scored with the methods `thesis` and `corrected`. Both maps are looked up at 12
+# locations and evaluated against the expected graspability of the locations.
 #
 #   make -f pipelines/primitive_shapes.mk OUT=folder [SHARES=4] -j2
 
@@ -25,7 +25,7 @@ all: $(OUT)/scene.png $(methods)
 $(OUT):
 	@mkdir -p $@
 
-# About as many points as in the thesis's scan of this scene.
+# This spacing gives about as many points as the scan of this scene in the thesis.
 $(OUT)/terrain.pcd: | $(OUT)
 	@exec $(GRASPMAP) simulate scene --spacing $(SPACING) -o $@
 

@@ -1,6 +1,6 @@
-# Simulation of the thesis's scenario 4: a rock site, its scan by a hand-held Kinect v2, and the stages of
-# scan.mk (cloud, surface, the 3 x 3 m site, texture, samples, map), each with its distance to the true
-# mesh. Needs no data. FIELD_TEST are flags of `graspmap grasp`, the virtual field test on the true mesh.
+# Simulation of scenario 4 of the thesis: a rock site, its scan by a hand-held Kinect v2, and the stages
+# of scan.mk (cloud, surface, the 3 x 3 m site, texture, samples, map). Measures the distances of cloud
+# and site to the true mesh. Needs no data. FIELD_TEST are flags of `graspmap grasp` on the true mesh.
 #
 #   make -f pipelines/rock_site.mk OUT=folder [SEED=1] [FRAMES=60] [SITE=rocks] [EDGE=0.008] -j2
 
@@ -49,7 +49,7 @@ $(OUT)/site.png: $(OUT)/site/mesh.ply
 $(OUT)/scan.db: $(OUT)/site/mesh.ply
 	@exec $(GRASPMAP) simulate scan $< $(scan_flags) -o $@
 
-# Virtual field test: a gripper is closed on the true mesh.
+# Virtual field test: simulated grasps on the true mesh.
 $(OUT)/field_test.csv: $(OUT)/site/mesh.ply $(OUT)/site/field_points.csv $(OUT)/tested_with
 	@exec $(GRASPMAP) grasp $< --points $(word 2,$^) $(FIELD_TEST) -o $@
 

@@ -1,6 +1,6 @@
 # Graspability map from a scan's database: one cloud of all frames, a clean surface, the leveled and
 # cropped site with its photographs as texture, uniform samples of the site, and the map with look-up,
-# evaluation and images. If TRUTH is set, also the distances of the cloud and the site to the true mesh.
+# evaluation and images. With TRUTH, also measures the distances of cloud and site to the true mesh.
 #
 #   make -f pipelines/scan.mk SCAN=scan.db OUT=folder [POSES=odometry] [TRUTH=mesh.ply] \
 #        [CROP="--size 3x3"] [RESAMPLE="--count 73000"] [POINTS=points.csv] \
@@ -95,7 +95,7 @@ $(OUT)/poses.tum $(OUT)/refinement.json &: $(SCAN) $(OUT)/refined_with
 	@exec $(GRASPMAP) refine $< -o $(OUT)/poses.tum --report $(OUT)/refinement.json \
 	  $(REFINE)
 
-# fuse corrects the poses, so photographs match the cloud only with the corrected poses.
+# `fuse` corrects the poses, so the images match the cloud only with the corrected poses.
 $(cloud) $(OUT)/fused_poses.tum &: $(SCAN) $(or $(refined),$(wildcard $(POSES))) \
     $(OUT)/fused_with
 	@exec $(GRASPMAP) fuse $(SCAN) -o $(cloud) --corrected-poses $(OUT)/fused_poses.tum \

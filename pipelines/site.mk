@@ -6,9 +6,9 @@
 # POINTS is optional (columns x, y, z; first column: name). If it has a column `graspable` (1 or 0), the
 # map is evaluated against it. POINTS are in the frame of the site, or with POINTS_FRAME=map in the frame
 # of the map from which the site was cropped. SCENARIO is a name in data/scenarios or a file. METHOD
-# replaces the scenario's method. SCORE are further flags of `graspmap score`. SHARES is its number of
-# threads. A second run does nothing. A run that was stopped continues with the missing results. If a
-# variable or a file changes, the results that depend on it are recomputed.
+# replaces the scenario's method. SCORE are further flags of `graspmap score`, SHARES the number of
+# threads of this command. A second run does nothing. A run that was stopped continues with the missing
+# results. If a variable or a file changes, the results that depend on it are recomputed.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -38,7 +38,7 @@ endif
 include $(here)one_run.mk
 ifdef is_alone
 
-# Files of the scenario and of its gripper. Named ones are in data/, beside this folder.
+# Files of the scenario and of its gripper. If given by name, they are in data/, beside this folder.
 data := $(firstword $(wildcard $(here)../data) $(here)..)
 scenario_file := $(firstword $(wildcard $(SCENARIO) $(data)/scenarios/$(SCENARIO).yaml))
 gripper := $(if $(scenario_file),$(shell sed -n 's/^gripper: *\([^ \#]*\).*/\1/p' $(scenario_file)))

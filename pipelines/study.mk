@@ -1,8 +1,8 @@
-# Repetition of the thesis's chapters 4 and 5 in one run: the four scenarios, pre-scanned and in situ,
-# look-up of the field test's locations in every map, inclination of the robot's body, thresholds,
-# masks, evaluation of the published tables, and one report. Needs no data: sites, scans and the robot's
-# cameras are simulated. If GRASPMAP_DATA is the folder of the author's data, his clouds are also
-# processed and his tables evaluated.
+# Repeats the experiments of the thesis (chapters 4 and 5) in one run: maps of four scenarios, from an
+# earlier scan (pre-scanned) and from the robot's cameras (in situ); look-up of the field test's
+# locations in every map; inclinations of the robot's body; thresholds; masks; virtual field test; one
+# report. Needs no data: sites, scans and cameras are simulated. If GRASPMAP_DATA is the folder of the
+# thesis author's data, the author's clouds are also processed and the published tables evaluated.
 #
 #   make -f pipelines/study.mk OUT=folder [SCENARIOS="1 2 3 4"] [METHODS="thesis corrected"] \
 #        [STAGES="walls published thresholds masks grasp report"] [INCLINATIONS="10 25"] [SEED=1] -j2

@@ -8,10 +8,10 @@
 #
 # The thesis does not state its twelve pairs, so this grid is a choice of this project. The values of
 # H_add are those of the published parameter sets (table B 2-1 and the gripper HubRobo: 1, 3, 5). A TSV
-# has an effect on windows with fewer solid voxels (SSV). 120 is the thesis's TSV. 300 and 700 are about
-# the 5th percentile and the median of the SSV of `thesis` on the embedded scene, 2500 the median of
-# `corrected`. SITE is another cloud, evaluated only if EXPECTED is set. A second run does nothing. If a
-# variable or a file changes, the results that depend on it are recomputed.
+# reduces the score of a voxel if fewer ground voxels (SSV) are inside the mask. 120 is the thesis's TSV.
+# 300 and 700 are about the 5th percentile and the median of SSV on scenario 1 with method `thesis`, 2500
+# the median with `corrected`. SITE is another cloud, evaluated only if EXPECTED is set. A second run does
+# nothing. If a variable or a file changes, the results that depend on it are recomputed.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)

@@ -43,7 +43,7 @@ void bind_one(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind(table, options.reach);
   table.add("start", options.start,
             "start position of the robot: X,Y,Z (m) in the frame of --points-frame; largest: on "
-            "the largest region");
+            "the largest graspable region");
   bind(table, options.change);
   table.add(
       "transform", options.transform,
@@ -54,8 +54,8 @@ void bind_one(libmap::ParameterTable& table, AnalyzeOptions& options) {
 void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind_one(table, options);
   table.add("points_frame", options.points_frame, point_frame_names(),
-            "frame of the start position and of the expected regions; input: scored cloud; "
-            "terrain: terrain frame; map: cloud or mesh before `graspmap crop`");
+            "frame of the start position and of the expected regions; input: frame of the scored "
+            "cloud; terrain: frame of scoring, z up; map: frame before `graspmap crop`");
   table.add_former_key("pictures", "images");
   table.add("images", options.images, "write images and charts, not only tables");
   bind(table, options.table);

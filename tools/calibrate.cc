@@ -416,7 +416,7 @@ int main(int argc, char** argv) {
   command.inputs("IMAGES", options.images, "images of a chessboard (.png, .jpg), or their folders");
   command.output(options.output, "calibration file of the camera (.yaml)");
   command.option("--report", "DIR", options.report,
-                 "output folder for the errors of images and corners, as tables and charts");
+                 "output folder for reprojection errors of images and corners (tables, charts)");
   bind(command.parameters(), options);
   return command.run(argc, arguments.data(), [&](Run& run) { calibrate(options, run); });
 }

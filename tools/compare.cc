@@ -43,7 +43,7 @@ struct CompareOptions {
 
 void bind(libmap::ParameterTable& table, CompareOptions& options) {
   table.add("within_m", options.within_m, libmap::positive,
-            "maximum distance at which points match, for precision and completeness, m");
+            "distance within which a point matches the other surface (precision, completeness), m");
   table.add("samples_per_m2", options.samples_per_m2, libmap::positive,
             "number of sample points per area of a mesh's surface, per m2");
   table.add("seed", options.seed, {}, "random seed of the sample points on meshes");

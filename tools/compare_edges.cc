@@ -276,7 +276,7 @@ int graspmap_tools::compare_edges(int argc, char** argv) {
   SpotCheckCommandOptions options;
   bool edges = true;
   Command command("compare",
-                  "With --edges: height errors at locations along the four edges of a site: a (y = "
+                  "With --edges: measures height errors along the four edges of a site: a (y = "
                   "min), then counter-clockwise b (x = max), c (y = max), d (x = min).");
   command.flag("--edges", edges, "measure height errors along the four edges of one site");
   command.input("SITE", options.file, "cloud or mesh of the site");

@@ -458,8 +458,8 @@ void run_bag(const BagCommandOptions& options, Run& run) {
 int graspmap_tools::convert_bag(int argc, char** argv) {
   BagCommandOptions options;
   Command command("convert",
-                  "With a ROS bag: extracts depth images or a cloud, or writes a map or a rig's "
-                  "images.");
+                  "With a ROS bag: reads depth images or a cloud from a bag, or writes a map or a "
+                  "rig's images to one.");
   command.input(
       "IN", options.input,
       "bag to read: .bag (ROS 1), .mcap, .db3 or its folder (ROS 2); for writing a bag: a map "
@@ -470,8 +470,8 @@ int graspmap_tools::convert_bag(int argc, char** argv) {
       "of its clouds (.pcd, .ply, .vtp, .csv); bag to write: OUT.bag (ROS 1), OUT.mcap, or a "
       "folder (no extension) of .db3 (ROS 2)");
   command.option("--topic", "[NAME=]TOPIC", options.topics,
-                 "topic of a camera's depth images, NAME: the camera's name (repeatable; default: "
-                 "all), or of the cloud (default: the only topic of clouds)");
+                 "topic to read: depth images of the camera NAME (repeatable; default: all "
+                 "cameras), or a cloud (default: the only topic of clouds)");
   command.option(
       "--rig", "FILE|NAME", options.rig,
       "rig file, or rig of the toolkit; default: the bag's camera infos and transforms, or the "
@@ -480,7 +480,7 @@ int graspmap_tools::convert_bag(int argc, char** argv) {
   command.option("--curvature", "CLOUD", options.curvature,
                  "cloud for the topic /curvature_map; default: the map with computed curvatures");
   command.option("--footholds", "FOOTHOLDS", options.footholds,
-                 "footholds of the map, for the topics /footholds and /foothold_poses");
+                 "footholds of the map, written to the topics /footholds and /foothold_poses");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { run_bag(options, run); });
 }

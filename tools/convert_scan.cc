@@ -414,9 +414,8 @@ bool graspmap_tools::is_scan_path(const std::string& path) {
 
 int graspmap_tools::convert_scan(int argc, char** argv) {
   ExtractOptions options;
-  Command command(
-      "convert",
-      "With a scan: the scan as plain files, for MeshLab (--bundler) or COLMAP (--colmap).");
+  Command command("convert",
+                  "With a scan: writes the scan as plain files, also for MeshLab or COLMAP.");
   command.input("SCAN", options.scan, "RTAB-Map database, or a folder of frames");
   command.output(options.output, "output folder for the whole scan; an earlier output is replaced",
                  false);

@@ -171,7 +171,7 @@ bool graspmap_tools::is_world_path(const std::string& path) {
 
 int graspmap_tools::convert_world(int argc, char** argv) {
   WorldCommandOptions options;
-  Command command("convert", "With -o OUT.world: a site as a world for simulators.");
+  Command command("convert", "With -o OUT.world: writes a site as a world for robot simulators.");
   command.input("SITE", options.site, "mesh of the site (.ply .obj .glb ...), or folder of tiles");
   command.output(options.output,
                  "folder OUT.world with SDF (Gazebo, CoppeliaSim), MJCF (MuJoCo), URDF (Bullet)");

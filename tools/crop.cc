@@ -306,11 +306,11 @@ int main(int argc, char** argv) {
   command.input("MAP", options.input,
                 "mesh (.ply .obj .stl .tif ...), a folder of its tiles, or cloud (.pcd .ply .csv)");
   command.output(options.output,
-                 "cropped mesh or cloud (transform: STEM.site_from_map.txt), or folder of tiles");
+                 "cropped mesh, cloud or folder of tiles, with STEM.site_from_map.txt (transform)");
   command.option("--box", "XMIN,YMIN[,ZMIN],XMAX,YMAX[,ZMAX]", options.box,
                  "box to keep, m (its frame: --frame)");
   command.option("--polygon", "FILE.csv", options.polygon,
-                 "table of the area's corners in order: columns x, y, m; convex or not");
+                 "corners of the area to keep, in order: CSV with columns x, y, m; may be concave");
   command.option(
       "--size", "WIDTHxHEIGHT", options.size,
       "size of the rectangle to keep, m, placed as far as possible from the data's border");

@@ -126,8 +126,8 @@ int main(int argc, char** argv) {
   Command command("evaluate");
   command.former_flag("--hold-model", "not needed: forces need no fit for a gripper");
   command.inputs("TABLE.csv", options.tables,
-                 "table of labels and scores, one row per location; of several tables, the common "
-                 "columns are evaluated");
+                 "table of true labels and scores, one row per location; the rows of several "
+                 "tables are joined, with their common columns");
   command.output(
       options.folder,
       "output folder: roc.csv, rates.csv, accuracy.csv, summary.json and .md, roc.png and .svg");

@@ -28,9 +28,9 @@ struct PanoramaCommandOptions {
 
 void bind(libmap::ParameterTable& table, PanoramaCommandOptions& options) {
   table.add("stamp_s", options.stamp,
-            "stamp of the set of images to fuse, s; fullest: the set with most cameras");
+            "time stamp of the image set to fuse, s; fullest: set with images of most cameras");
   table.add("tolerance_s", options.tolerance_s, libmap::not_negative,
-            "maximum difference between the stamps of an image and its set, s");
+            "maximum difference between the time stamps of an image and its image set, s");
   table.add("strict", options.strict, "fail if a camera has no usable image, instead of a warning");
   bind(table, options.panorama);
 }
@@ -148,8 +148,8 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
 int graspmap_tools::fuse_rig(int argc, char** argv) {
   PanoramaCommandOptions options;
   Command command("fuse",
-                  "With the folder of a camera rig: one cloud in the robot's frame from depth "
-                  "images of the same time.");
+                  "With the folder of a camera rig: fuses depth images of the same time into one "
+                  "cloud in the robot's frame.");
   command.input("RIG_FOLDER", options.folder,
                 "folder of rig.yaml and depth images: CAMERA/STAMP.png, or as in images.csv");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");

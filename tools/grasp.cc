@@ -59,16 +59,16 @@ void bind(libmap::ParameterTable& table, GraspCommandOptions& options) {
   table.add_overrides("gripper", options.overrides);
   bind(table, options.grasp);
   table.add("surface_error", options.surface_error,
-            "error of the mesh that the trials simulate; none: no error; mesh: vertex field "
-            "expected_error; a number: standard deviation, m");
-  table.add("sequential", options.sequential,
-            {{"auto", SequentialTest::automatic},
-             {"on", SequentialTest::on},
-             {"off", SequentialTest::off}},
-            "early end of the test at a location when its verdict is certain; on: always; off: "
-            "never; auto: with --map");
+            "random error of the mesh in the trials; none: no error; mesh: standard deviation from "
+            "the vertex field expected_error; a number: standard deviation, m");
+  table.add(
+      "sequential", options.sequential,
+      {{"auto", SequentialTest::automatic},
+       {"on", SequentialTest::on},
+       {"off", SequentialTest::off}},
+      "end the trials at a location when it is certain whether most hold; auto: on with --map");
   table.add("map_draws", options.map_draws, {1, 100000},
-            "with --map: number of draws of asperities at each pose, instead of --draws");
+            "with --map: number of random asperity samples at each pose, instead of --draws");
   table.add("more_loads", options.more_loads,
             "additional loads to test, N, separated by commas; each has its own result columns");
   table.add("prefix", options.prefix, "prefix added to the names of the result columns");
@@ -346,29 +346,28 @@ int main(int argc, char** argv) {
   GraspCommandOptions options;
   Command command("grasp");
   command.input("MESH", options.mesh,
-                "mesh or DEM (.tif) of the terrain, z up; level: level ground, for --fit");
+                "terrain: mesh or elevation model (.tif), z up; level: level ground, for --fit");
   command.option("--points", "LOCATIONS.csv", options.points,
-                 "table of locations: CSV with columns x, y, z (mesh frame, m) and any others");
-  command.option(
-      "--map", "MAP", options.map,
-      "graspability map of the mesh (.pcd, .ply, .csv, .tiles), whose voxels are the locations; "
-      "instead of --points");
+                 "locations to test: CSV with columns x, y, z (mesh frame, m) and any others");
+  command.option("--map", "MAP", options.map,
+                 "instead of --points: graspability map of the mesh (.pcd, .ply, .csv, .tiles), "
+                 "whose voxels are tested");
   command.output(
       options.output,
-      "with --points: CSV of the locations with the results of their trials; with --map: the map "
-      "with added fields (.pcd, .ply, .vtp, .csv), or a tile store (.tiles); with --fit: a "
-      "gripper file (.yaml) with the fitted ensemble; with --plan: CSV of pulls");
+      "with --points: CSV of the locations with test results; with --map: the map with test "
+      "results as fields (.pcd, .ply, .vtp, .csv), or a tile store (.tiles); with --fit: gripper "
+      "file (.yaml) with fitted force parameters; with --plan: CSV of planned pull tests");
   command.option(
       "--fit", "PULLS.csv", options.pulls,
-      "table of pull tests to which the gripper's parameters are fitted; columns x, y, z (m) or "
-      "ground (level); tilt_deg, azimuth_deg; force_n at slip, or load_n and held (0 or 1)");
+      "pull tests to which force parameters are fitted: CSV with x, y, z (m) or ground = level; "
+      "tilt_deg, azimuth_deg of the pull; force_n at slip, or load_n and held (0 or 1)");
   command.option("--plan", "N", options.plan,
                  "with --points: number of most informative pull tests to plan");
   command.option("--tile", "K/N", options.tile,
-                 "with --map: test only share K of N of the tiles, into a tile store");
+                 "with --map: test only share K of N (1/N) of the tiles, into a tile store");
   command.option("--scenes", "FOLDER", options.scenes.folder,
-                 "output folder for one mesh per location that shows the trial nearest to the "
-                 "median force: FOLDER/PLACE.ply, named by the column 'place' or the row");
+                 "output folder for one mesh per location, which shows the trial with the median "
+                 "force; file name: column 'place' of LOCATIONS.csv, or the row number");
   command.option("--scene-locations", "LOCATIONS", options.scenes.locations,
                  "names of the locations that --scenes writes, separated by commas; default: all");
   command.renamed_flag("--scene-of", "--scene-locations");

@@ -26,14 +26,13 @@ struct LookupCommandOptions {
 
 void bind(libmap::ParameterTable& table, LookupCommandOptions& options) {
   bind(table, options.lookup);
-  table.add(
-      "points_frame", options.points_frame, listed_point_frame_names(),
-      "frame of the points; input: scored cloud; terrain: terrain frame; map: cloud or mesh "
-      "before `graspmap crop`, or mesh of a simulated robot; auto: by the manifest of POINTS, "
-      "else input");
+  table.add("points_frame", options.points_frame, listed_point_frame_names(),
+            "frame of POINTS; input: frame of the scored cloud; terrain: frame of scoring, z up; "
+            "map: frame before `graspmap crop`, or of a simulated robot's mesh; auto: from the "
+            "manifest of POINTS, else input");
   table.add("column", options.columns,
-            "columns to add, separated by commas: NAME=FIELD, or NAME=FIELD>=VALUE for 1 or 0; "
-            "empty: found, distance_m and every field of the map");
+            "columns to add, separated by commas: NAME=FIELD (field of the map), or "
+            "NAME=FIELD>=VALUE (1 or 0); empty: found, distance_m and all fields");
   table.add("visible_radius_m", options.visible_radius_m, libmap::positive,
             "with --visible: maximum distance of a location from the nearest measured point, m");
 }
@@ -226,10 +225,10 @@ int main(int argc, char** argv) {
   command.input("MAP", options.map, "graspability map, or a tile store (.tiles)");
   command.input("POINTS", options.points,
                 "table of locations: CSV with the columns x, y, z in meters, and any others");
-  command.output(options.output, "CSV of the points with the map's values");
+  command.output(options.output, "POINTS with the map's values as added columns (.csv)");
   command.option("--visible", "CLOUD", options.visible,
-                 "measured cloud, usually the scored cloud itself, in the frame of the scored "
-                 "cloud; locations that are far from all its points get no values");
+                 "measured cloud in the frame of the scored cloud, usually this cloud itself; "
+                 "locations farther than --visible-radius from all its points get no values");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { lookup(options, run); });
 }

@@ -30,22 +30,22 @@ struct MaskOptions {
 // Options of sections only.
 void bind_sections(libmap::ParameterTable& table, MaskOptions& options) {
   table.add("section_layer", options.section_layer, {0, 1e6},
-            "layer of the mask shown by the lower horizontal section; 0: the lowest layer");
+            "with --sections: layer in the lower horizontal section; 0: the lowest layer");
   table.add("cell_width_px", options.cell_width_px, {64, 5000}, "image width of a section, pixels");
 }
 
 void bind(libmap::ParameterTable& table, MaskOptions& options) {
   table.add("gripper", options.gripper,
-            "gripper of the mask: scar-e, hubrobo, limbero, or a gripper file");
+            "gripper whose mask is written: scar-e, hubrobo, limbero, or a gripper file");
   table.add_overrides("gripper", options.overrides);
   table.add("method", options.mask.method, libgtd::method_names(),
-            "scoring method of the mask, as in score --method");
+            "scoring method that uses the mask, as in score --method");
   table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive,
-            "edge length of a voxel, m");
+            "edge length of the voxels, m");
   table.add("extra_void_layers", options.mask.extra_void_layers, {0, 10000},
-            "number of layers of void voxels that are added on top of the mask (H_add)");
+            "number of layers (H_add) added on top of the mask, in which ground lowers the score");
   table.add("view", options.view, libmap::viewpoint_names(), "viewpoint, as in render --view");
-  table.add("sections", options.sections, "draw three sections of the mask instead of a view");
+  table.add("sections", options.sections, "draw three sections through the mask instead of a view");
   bind_sections(table, options);
 }
 
@@ -265,7 +265,7 @@ int main(int argc, char** argv) {
   MaskOptions options;
   Command command("mask");
   command.output(options.output,
-                 "layers as text (.txt), solid voxels as a cloud (.vtp .pcd .ply .csv), or .png");
+                 "mask: text (.txt), cloud of solid voxels (.vtp .pcd .ply .csv) or image (.png)");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { mask(options, run); });
 }

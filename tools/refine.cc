@@ -295,22 +295,22 @@ int main(int argc, char** argv) {
       "and depth");
   add_calibration_option(command, options.calibration);
   command.option("--write-calibration", "OUT.yaml", options.new_calibration,
-                 "output for the estimated calibration, for --calibration of commands and scans");
+                 "output for the estimated camera calibration, which --calibration reads");
   command.option("--known-length", "NODE:X:Y-NODE:X:Y=METERS", options.known_lengths,
-                 "measured distance between two points, each given by node and pixel of its image; "
-                 "repeatable; it determines the scale");
+                 "measured distance between two points, each at a pixel of a node's image; sets "
+                 "the scale of the map; repeatable");
   command.option("--board", "COLUMNSxROWS:METERS", options.board,
-                 "numbers of inner corners and square side of a static chessboard in the scene; it "
-                 "determines the scale");
+                 "static chessboard in the scene, by inner corners and square side; sets the scale "
+                 "of the map");
   command.option("--report", "FILE.json|FILE.txt", options.reports,
                  "output for a report on each stage and the standard deviations of the poses");
   command.option("--feature-cache", "FOLDER|off", options.feature_cache,
-                 "folder for the frames' features, which later runs reuse; off: no such folder; "
-                 "default: OUTPUT.features");
+                 "folder in which image features are kept for later runs; off: none; default: "
+                 "OUTPUT.features");
   command.flag("--nodes", options.nodes, "add the node id as a ninth column of a .tum output");
   libmap::bind(command.parameters(), options.refinement);
   command.parameters().add("strict", options.strict,
-                           "fail if parts of the scan are missing, instead of warning");
+                           "fail if parts of the scan cannot be read, instead of warning");
   // Image pyramids are allocated for each frame. Returning them to the system costs 12 % of the
   // time of features.
   mallopt(M_TRIM_THRESHOLD, 1 << 28);

@@ -256,10 +256,10 @@ void bind_points(libmap::ParameterTable& table, SceneFileOptions& options) {
             "column of names of marked locations; auto: first column, unless it is x, y or z; "
             "none: no names");
   table.add("verdict", options.verdict,
-            "column of the verdicts of marked locations; 1: green; 0: red; empty: neutral");
+            "column that colors the marked locations; 1: green; 0: red; empty: neutral color");
   table.add("points_frame", options.points_frame, listed_point_frame_names(),
-            "frame of the marked locations; input: scored cloud; terrain: terrain frame; map: "
-            "cloud or mesh before `graspmap crop`; auto: by the locations' manifest, else input");
+            "frame of marked locations; input: frame of the scored cloud; terrain: frame of "
+            "scoring; map: frame before `graspmap crop`; auto: from their manifest, else input");
 }
 
 // Binds all options except `points`, which is a separate option.
@@ -277,8 +277,8 @@ void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
             {{"auto", MapHeading::automatic},
              {"terrain", MapHeading::terrain},
              {"input", MapHeading::input}},
-            "horizontal axes of a map's image; terrain: terrain frame; input: scored cloud; "
-            "auto: terrain for one file, input for several");
+            "axes to which a map's image is parallel; terrain: frame of scoring; input: frame of "
+            "the scored cloud; auto: terrain for one file, input for several");
 }
 
 // Reads a cloud, mesh, graspability map or tile store. Throws Error naming the file.

@@ -340,10 +340,10 @@ void score_into_store(const ScoreOptions& options, const fs::path& gripper_file,
 void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   bind(table, options.detection);
   table.add("up", options.up,
-            "direction out of the ground: X,Y,Z in the cloud's frame; auto: viewpoint, normals or "
-            "z axis");
+            "direction out of the ground: X,Y,Z in the cloud's frame; auto: from the cloud's "
+            "viewpoint, else its normals, else its z axis");
   table.add("frame", options.frame, libgtd::map_frame_names(),
-            "frame of the map's points; terrain: terrain frame; input: frame of the scored cloud");
+            "frame of the map's points; terrain: as set by --plane; input: frame of the cloud");
 }
 
 void add_results(const libgtd::DetectionResult& result, const ScoreOptions& options, Run& run) {
@@ -440,18 +440,18 @@ int main(int argc, char** argv) {
   ScoreOptions options;
   Command command("score");
   command.input("TERRAIN", options.terrain,
-                "cloud of the terrain (.pcd, .ply, .csv) or DEM (.tif), or a folder of its tiles");
+                "terrain: cloud (.pcd, .ply, .csv), DEM (.tif), or a folder of tiles of either");
   command.output(options.output,
-                 "graspability map (.pcd, .ply, .vtp, .csv), or tile store (.tiles)");
+                 "graspability map (.pcd .ply .vtp .csv), or tile store: folder of tiles (.tiles)");
   command.option(
       "--tile", "K/N", options.tile,
-      "score only share K of N of the tiles of a tile store; the last share completes it");
+      "score only share K of N (1/N) of the tiles; all N shares complete the tile store");
   command.option("--max-points-in-memory", "N", options.max_points_in_memory,
-                 "for a tile store: maximum number of points in memory (about 250 bytes each); the "
-                 "map does not depend on this number");
+                 "for a tile store: maximum number of cloud points in memory (about 250 bytes "
+                 "each); the map does not depend on it");
   command.renamed_flag("--points-at-once", "--max-points-in-memory");
   command.flag("--append", options.append,
-               "score the tiles affected by files that were added to the terrain's folder");
+               "extend a tile store: score tiles affected by new clouds in the folder TERRAIN");
   bind(command.parameters(), options);
   command.config_resolver(
       [](const std::string& name) { return libmap::find_data_file("scenarios", name); });

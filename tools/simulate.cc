@@ -1,4 +1,4 @@
-// graspmap simulate WHAT: simulates terrains and recordings with known truth.
+// graspmap simulate WHAT: simulates terrains and recordings with ground truth.
 #include "tools/support/subcommands.h"
 
 #include <iostream>
@@ -26,7 +26,7 @@ constexpr Entry entries[] = {
 };
 
 void print_help() {
-  std::cout << "Terrains and recordings with known truth.\n\n"
+  std::cout << "Terrains and recordings with ground truth.\n\n"
                "Usage: graspmap simulate WHAT ... -o OUTPUT [options]\n\nWHAT:\n";
   for (const Entry& entry : entries) {
     std::string name = entry.name;

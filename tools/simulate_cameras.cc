@@ -141,7 +141,7 @@ void simulate(const SimulateCamerasOptions& options, Run& run) {
 
 int graspmap_tools::simulate_cameras(int argc, char** argv) {
   SimulateCamerasOptions options;
-  Command command("simulate cameras", "Depth images of a robot's cameras at one pose.");
+  Command command("simulate cameras", "Simulates a robot's depth images at one pose.");
   command.input("MESH", options.mesh, "mesh of the terrain (.ply, .obj, .stl, .off, .glb)");
   command.output(options.output, "folder of 16-bit depth images and their rig file");
   bind(command.parameters(), options);

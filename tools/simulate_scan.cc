@@ -36,7 +36,7 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
   libmap::ScanSimulationOptions& simulation = options.simulation;
   table.add("sensor", options.sensor,
             "depth camera: a name in data/sensors or a file, from which camera, noise, range, "
-            "timing and faults are taken unless options set them; auto: the defaults");
+            "timing and faults are taken unless options set them; auto: defaults of the options");
   table.add("camera", options.camera,
             "calibration file of the camera (.yaml), or a camera of the toolkit: realsense-d435, "
             "ipad-lidar; empty: a Kinect v2, 512 x 424 pixels");
@@ -69,7 +69,7 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
             "format of color images; jpeg: lossy; png: lossless");
   table.add("seed", simulation.seed, libmap::not_negative, "random seed of the scan");
   table.add("rock_seed", simulation.rock_seed, libmap::not_negative,
-            "random seed of the rock's colors, to be equal for all scans of one ground; 0: --seed");
+            "random seed of the rock texture, equal for all scans of one ground; 0: as --seed");
 }
 
 void add_results(const libmap::ScanSimulationResult& result, Run& run) {
@@ -219,7 +219,7 @@ void simulate(SimulateScanOptions& options, Run& run) {
 
 int graspmap_tools::simulate_scan(int argc, char** argv) {
   SimulateScanOptions options;
-  Command command("simulate scan", "A scan of a mesh or a terrain by a handheld depth camera.");
+  Command command("simulate scan", "Simulates a handheld depth camera on a mesh or terrain.");
   command.input("SCENE", options.scene,
                 "scene to scan: a mesh (.ply, .obj, .stl, .off, .glb), or a height field as a "
                 "cloud or a folder of clouds of any size (.pcd, .ply, .csv)");

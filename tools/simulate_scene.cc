@@ -92,7 +92,7 @@ void simulate(const SimulateOptions& options, Run& run) {
 
 int graspmap_tools::simulate_scene(int argc, char** argv) {
   SimulateOptions options;
-  Command command("simulate scene", "Terrains of primitive shapes with exact truth.");
+  Command command("simulate scene", "Generates primitive shapes with ground truth.");
   command.output(options.output, "cloud with true normals and curvatures, or mesh");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { simulate(options, run); });

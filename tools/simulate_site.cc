@@ -86,9 +86,8 @@ void simulate(const SimulateSiteOptions& options, Run& run) {
 
 int graspmap_tools::simulate_site(int argc, char** argv) {
   SimulateSiteOptions options;
-  Command command("simulate site",
-                  "Test sites of rocks, slopes or climbing holds, with their true surface.");
-  command.output(options.output, "folder: mesh.ply, field_points.csv, site.yaml");
+  Command command("simulate site", "Generates a test site of rocks, slopes or climbing holds.");
+  command.output(options.output, "folder: mesh.ply (true surface), field_points.csv, site.yaml");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { simulate(options, run); });
 }

@@ -60,8 +60,8 @@ void simulate(SimulateTerrainOptions& options, Run& run) {
 
 int graspmap_tools::simulate_terrain(int argc, char** argv) {
   SimulateTerrainOptions options;
-  Command command("simulate terrain", "Rocky ground of any size as a folder of clouds.");
-  command.output(options.output, "folder: piece_I_J.pcd, one per tile of the x-y plane");
+  Command command("simulate terrain", "Generates rocky ground of any size as a folder of clouds.");
+  command.output(options.output, "folder of clouds piece_I_J.pcd, one per tile of the x-y plane");
   command.parameters().add("size", options.size, "size of the terrain in m: XxY, or M for M x M");
   bind(command.parameters(), options.tiles);
   return command.run(argc, argv, [&](Run& run) { simulate(options, run); });

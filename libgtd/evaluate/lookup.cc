@@ -279,8 +279,8 @@ std::vector<std::pair<std::string, LookupMode>> lookup_mode_names() {
 
 void bind(libmap::ParameterTable& table, LookupOptions& options) {
   table.add("mode", options.mode, lookup_mode_names(),
-            "map points used for a location; nearest: closest point; maximum: point with the "
-            "highest score within the radius; mean: all points within the radius");
+            "map points whose values a location gets; nearest: closest point; maximum: point with "
+            "the highest score within --radius; mean: mean of the points within --radius");
   table.add("radius_m", options.radius_m, libmap::positive,
             "radius around a location for modes maximum and mean, m");
   table.add("max_distance_m", options.max_distance_m, libmap::positive,

@@ -161,7 +161,7 @@ constexpr double rounding = 1e-9;  // relative to the bin width
 
 void bind(libmap::ParameterTable& table, MapAnalysisOptions& options) {
   table.add("score_bin", options.score_bin, libmap::Range{0.0, 1.0, true, false},
-            "bin width of the score histogram");
+            "bin width of the histogram of scores, which are from 0 to 1");
   table.add("height_bin_m", options.height_bin_m, libmap::positive,
             "bin width of the height histogram, m");
   table.add("slope_bin_deg", options.slope_bin_deg, libmap::Range{0.0, 90.0, true, false},

@@ -204,8 +204,8 @@ void find_unpaired(const VoxelMap& map, const VoxelMap& other, MapChange& change
 void bind(libmap::ParameterTable& table, MapChangeOptions& options) {
   table.add("match_distance_voxels", options.match_distance_voxels,
             libmap::Range{0.0, 10.0, true, false},
-            "maximum distance of corresponding voxels of different lattices, in edges of the "
-            "larger voxel");
+            "with --against, if the voxel lattices differ: maximum distance of corresponding "
+            "voxels, in edge lengths of the larger voxel");
 }
 
 std::string_view to_text(VoxelMatching matching) {

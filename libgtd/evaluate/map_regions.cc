@@ -362,9 +362,9 @@ void describe_access(const MapRegionResult& regions, const std::vector<double>& 
 
 void bind(libmap::ParameterTable& table, MapRegionOptions& options) {
   table.add("adjacency_voxels", options.adjacency_voxels, libmap::Range{1.0, 100.0},
-            "maximum index difference of connected voxels of a region, per axis; 1: 26 neighbors");
+            "maximum index difference, per axis, of connected voxels of a region; 1: 26 neighbors");
   table.add("min_voxels", options.min_voxels, libmap::Range{1.0, 1e9},
-            "minimum number of voxels of a region; smaller regions are skipped");
+            "minimum number of voxels of a graspable region; smaller regions are skipped");
 }
 
 MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
@@ -394,7 +394,7 @@ MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
 
 void bind(libmap::ParameterTable& table, RegionReachOptions& options) {
   table.add("stride_m", options.stride_m, libmap::positive,
-            "maximum step of the robot from one region to another, m");
+            "maximum distance between two graspable regions that the robot can step across, m");
 }
 
 RegionReach find_reach(const VoxelMap& map, const MapRegionResult& regions,

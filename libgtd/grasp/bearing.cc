@@ -88,7 +88,7 @@ void bind(libmap::ParameterTable& table, EngagementOptions& options) {
   using libmap::positive;
   constexpr libmap::Range cone{0.0, 89.0};
   table.add("law", options.law, engagement_law_names(),
-            "law of contact forces; asperities: random facets; adhesion: limited tension (LORIS)");
+            "force model; asperities: friction on random facets; adhesion: tension limit (LORIS)");
   table.add("adhesion_limit_n", options.adhesion_limit_n, positive,
             "law adhesion: maximum total tension of all fingers, N");
   table.add("adhesion_lateral_deg", options.adhesion_lateral_deg, cone,

@@ -21,10 +21,10 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
             {{"up", ApproachDirection::up}, {"normal", ApproachDirection::normal}},
             "approach direction; up: from above along z; normal: along the normal of the ground");
   table.add("trials", options.poses, {1, 100000}, "number of gripper poses at each location");
-  table.add("draws", options.draws, {1, 100000}, "number of draws of asperities at each pose");
+  table.add("draws", options.draws, {1, 100000}, "number of random asperity samples at each pose");
   table.add("best_draws", options.best_draws, {0, 100000},
-            "number of draws of asperities at each pose for which the holding force with the best "
-            "distribution over the spines is also computed");
+            "number of asperity samples at each pose for which the holding force is also computed "
+            "with the best load distribution over the spines");
   table.add("seed", options.seed, not_negative, "random seed");
   table.add("offset_m", options.offset_m, {0.0, 1.0},
             "standard deviation of the random offset of the palm from the location in x and y, m");
@@ -33,7 +33,7 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
   table.add("max_distance_m", options.max_distance_m, positive,
             "maximum distance of a tested location from the mesh, m");
   table.add("ensemble", options.ensemble,
-            "use the gripper's ensemble of parameter sets instead of the gripper file's values");
+            "vary force parameters over the gripper's ensemble; false: values of the gripper file");
   bind(table, options.closing);
   bind(table, options.engagement);
   bind(table, options.surface);

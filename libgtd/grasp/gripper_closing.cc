@@ -244,8 +244,8 @@ void bind(libmap::ParameterTable& table, ClosingOptions& options) {
   table.add("normal_radius_m", options.normal_radius_m, {1e-5, 0.1},
             "radius within which the ground normal at a contact is averaged, m");
   table.add("max_unseen", options.max_unseen, libmap::zero_to_one,
-            "maximum share of unseen ground below a finger; a finger above more unseen ground has "
-            "no contacts");
+            "maximum fraction of unmeasured or inaccurate ground below a finger; above it, the "
+            "finger has no contacts");
 }
 
 GroundPatch patch_around(const Ground& ground, const Eigen::Vector3d& location,

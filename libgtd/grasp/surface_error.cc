@@ -41,9 +41,9 @@ GroundErrors bounded(const libmap::TriangleMesh& mesh, std::vector<double> error
 
 void bind(libmap::ParameterTable& table, SurfaceErrorOptions& options) {
   table.add("surface_correlation_m", options.correlation_m, {1e-4, 10.0},
-            "correlation length of simulated mesh errors, m (correlation 0.29 at this distance)");
+            "distance at which the correlation of simulated mesh errors is 0.29, m");
   table.add("max_surface_error_m", options.max_error_m, {0.0, 0.1, true, false},
-            "standard deviation of the mesh error above which ground counts as unseen, m");
+            "standard deviation of the mesh error above which ground counts as unmeasured, m");
 }
 
 GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptions& options) {

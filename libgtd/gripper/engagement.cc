@@ -44,7 +44,7 @@ void bind(libmap::ParameterTable& table, Engagement& engagement) {
   table.add("engagement.asperity_max_deg", engagement.asperity_max_deg, angle_range,
             "maximum inclination of an asperity's facet to the ground, against the drag, degrees");
   table.add("engagement.engagement_rate", engagement.engagement_rate, libmap::not_negative,
-            "mean number of facets that a dragged spine meets, 1/mm");
+            "mean number of facets that a spine meets per mm of drag, 1/mm");
   table.add("engagement.drag_mm", engagement.drag_mm, libmap::not_negative,
             "distance over which the closing gripper drags its spines, mm");
 }

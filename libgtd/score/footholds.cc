@@ -201,9 +201,9 @@ void bind(libmap::ParameterTable& table, FootholdOptions& options) {
   table.add("separation_m", options.separation_m, libmap::positive,
             "minimum distance between footholds, m");
   table.add("min_score", options.min_score, libmap::zero_to_one,
-            "minimum score of a foothold (hold_probability if the map has it)");
+            "minimum score of a foothold, or hold_probability if the map has this field");
   table.add("graspable_only", options.graspable_only,
-            "select only voxels with hold_probability >= 0.5, or graspable if the map has none");
+            "select only graspable voxels (hold_probability >= 0.5, if the map has this field)");
   table.add("border", options.border, "include voxels at the border of the scanned area");
   table.add("surface_radius_m", options.surface_radius_m, libmap::positive,
             "radius within which normal and curvature are estimated, m");

@@ -16,41 +16,41 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
   using libmap::not_negative;
   using libmap::positive;
   table.add("method", scenario.method, method_names(),
-            "scoring method; calibrated: probability that the grasp holds the load; corrected: "
-            "match of ground and gripper mask; thesis: as the program of the thesis; envelope: "
-            "as thesis with a mask of the area that the spines reach; climblab: as ClimbLab v3");
+            "score; calibrated: probability that the gripper holds --load; corrected: share of the "
+            "ground voxels that match the gripper mask; thesis: as the original program (2023); "
+            "envelope: as thesis, only voxels that fingers reach; climblab: as ClimbLab v3");
   table.add("gripper", scenario.gripper, "gripper: scar-e, hubrobo, limbero, or a gripper file");
-  table.add("voxel_size_m", scenario.voxel_size_m, positive, "edge length of a voxel, m");
+  table.add("voxel_size_m", scenario.voxel_size_m, positive, "edge length of the voxels, m");
   table.add("extra_void_layers", scenario.extra_void_layers, {0, 10000},
-            "number of void layers added on top of the gripper mask (H_add)");
+            "number of mask layers (H_add) added on top, in which ground lowers the score");
   table.add("solid_voxel_threshold", scenario.solid_voxel_threshold, {1, 2147483647},
-            "number of occupied voxels inside the mask below which the score is reduced (TSV)");
+            "number of ground voxels in the gripper mask (TSV) up to which the score is reduced");
   table.add("load_n", scenario.load_n, positive,
-            "pull on the gripper for which method calibrated predicts the hold probability, N");
+            "method calibrated: pull that the gripper must hold, N");
   table.add(
       "zero_plane_m", scenario.zero_plane_m, libmap::any_number,
-      "minimum height of a target in the terrain frame, m; auto: 0; not used by method calibrated");
+      "minimum z of graspable voxels (terrain frame), m; auto: 0; not used by method calibrated");
   table.add("interpolation", scenario.interpolation, "fill terrain gaps by Delaunay interpolation");
   table.add("interpolation_max_edge_m", scenario.interpolation_max_edge_m, not_negative,
             "maximum edge length of an interpolated triangle in the x-y plane, m; 0: no limit");
   table.add("graspability_threshold", scenario.graspability_threshold, libmap::zero_to_one,
             "minimum score of a graspable voxel; auto: 0.8; not used by method calibrated");
   table.add("probability_threshold", scenario.probability_threshold, libmap::zero_to_one,
-            "minimum hold probability of a graspable voxel, method calibrated");
+            "method calibrated: minimum hold probability of a graspable voxel");
   table.add("curvature_radius_m", scenario.curvature_radius_m, not_negative,
-            "radius of the curvature fits, m; 0: convexity is not evaluated");
+            "radius within which curvature is fitted, m; 0: convexity is not evaluated");
   table.add("intersection_distance_m", scenario.intersection_distance_m, positive,
-            "maximum distance of a convex voxel from a convex point, m");
+            "distance to a convex point within which a voxel counts as convex, m");
   table.add("orientation", scenario.orientation, orientation_names(),
-            "axis of the gripper mask; plane: z axis of the terrain frame; surface: normal of the "
-            "surface at each voxel");
+            "axis along which the gripper mask is placed; plane: z of the terrain frame; surface: "
+            "surface normal at each voxel");
   table.add("normal_radius_m", scenario.normal_radius_m, not_negative,
-            "radius of the surface normal fits, m; 0: palm diameter of the gripper");
+            "radius within which a surface normal is fitted, m; 0: palm diameter of the gripper");
   table.add("obstacle_height_m", scenario.obstacle_height_m, not_negative,
-            "minimum rise of a steep face that is an obstacle, m; 0: obstacles are not evaluated");
+            "height above which a steep face is an obstacle, m; 0: obstacles are not evaluated");
   table.add("obstacle_slope_deg", scenario.obstacle_slope_deg, {0.0, 180.0},
-            "minimum slope of a face that can be an obstacle, degrees; 0: no obstacles");
-  table.add("tile_size_m", scenario.tile_size_m, positive, "width of a tile of the terrain, m");
+            "slope above which ground is part of a steep face, degrees; 0: no obstacles");
+  table.add("tile_size_m", scenario.tile_size_m, positive, "side of the terrain's square tiles, m");
   table.add_overrides("gripper", scenario.gripper_overrides);
 }
 

@@ -226,12 +226,11 @@ void bind(ParameterTable& table, FeatureOptions& options) {
   table.add("min_contrast", options.min_contrast, positive,
             "minimum contrast of a SIFT feature, for image values from 0 to 1");
   table.add("pixel_noise_px", options.pixel_noise_px, positive,
-            "standard deviation of a feature's image position at the finest scale, pixels");
-  table.add(
-      "scale_noise", options.scale_noise, not_negative,
-      "standard deviation of a feature's image position per pixel of the feature's size, px/px");
+            "standard deviation of a feature's position: constant term, searched image's pixels");
+  table.add("scale_noise", options.scale_noise, not_negative,
+            "standard deviation of a feature's position: term proportional to its size, px/px");
   table.add("surface_noise_m", options.surface_noise_m, not_negative,
-            "standard deviation of a fitted plane's depth that averaging does not reduce, m");
+            "minimum standard deviation of a plane fitted to many depth pixels, m");
   table.add(
       "surface_step_px", options.surface_step_px, {1, 32},
       "step of the grid to which depth images are downsampled, pixels; larger for long scans");

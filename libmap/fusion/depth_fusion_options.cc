@@ -11,17 +11,17 @@ void describe_surface(ResultTable& table, const FusionCounts& counts) {
   table.add("surface_elements", counts.elements, Merge::sum,
             "number of surface elements, from which points are selected");
   table.add("dropped_too_few_views", points.unconfirmed, Merge::sum,
-            "number of elements dropped: measured by fewer than min_views frames");
+            "number of surface elements dropped: fewer than min_views frames measured the element");
   table.add("dropped_seen_through", points.seen_through, Merge::sum,
-            "number of elements dropped: too many views see through the elements");
+            "number of surface elements dropped: too many frames see through the element");
   table.add("dropped_missed", points.missed, Merge::sum,
-            "number of elements dropped: too many views have no depth at the elements");
+            "number of surface elements dropped: too many frames have no depth at the element");
   table.add("dropped_contradicted", points.contradicted, Merge::sum,
-            "number of elements dropped: seen by one or two frames near contradicted elements");
+            "number of surface elements dropped: one or two frames, near contradicted elements");
   table.add("dropped_beyond_edges", points.beyond_edge, Merge::sum,
-            "number of elements dropped: beyond an edge at which the surface bends");
+            "number of surface elements dropped: beyond an edge at which the surface bends");
   table.add("merged", points.merged, Merge::sum,
-            "number of elements merged with another element in the same or the next voxel");
+            "number of surface elements merged with another in the same or the next voxel");
   table.add("points", counts.output_points, Merge::sum, "number of points of the cloud");
   table.add("points_beyond_edges", points.extended_points, Merge::sum,
             "number of points added beyond measured edges");
@@ -49,12 +49,12 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
   table.add("square_noise", planes.noise.axial_of_square, not_negative,
             "standard deviation of depth: term proportional to squared range, 1/m");
   table.add("lateral_noise_px", planes.noise.lateral_px, not_negative,
-            "standard deviation of measurements across the line of sight, pixels");
+            "standard deviation of a measurement perpendicular to the line of sight, pixels");
   table.add("plane_radius_px", planes.radius_px, {1, 7},
-            "radius of the disc of pixels to which a plane is fitted, pixels");
+            "radius of the disc around a pixel in which a plane is fitted, pixels");
   table.add_former_key("min_pair_share", "min_pair_fraction");
   table.add("min_pair_fraction", planes.min_pair_fraction, zero_to_one,
-            "minimum share of pairs of opposite neighbors that agree with a pixel, to fit a plane");
+            "minimum share of opposite pixel pairs that agree with a pixel, to fit a plane there");
   table.add("disc_radius_voxels", options.disc_radius_voxels, positive,
             "radius of the disc around a point in which measurements are averaged, in voxels");
   table.add(
@@ -87,7 +87,7 @@ void describe(ResultTable& table, const FusionCounts& counts) {
 void describe(ResultTable& table, const DepthFusionResult& result) {
   table.add("frames", result.frames, "number of fused frames");
   table.add("redundant_frames", result.redundant_frames,
-            "number of frames skipped because earlier frames measured the same surface");
+            "number of frames skipped because earlier frames measured their surface well enough");
   table.add("skipped_frames", result.skipped.size(), "number of frames that could not be used");
   describe(table, result.pixels);
   table.add("axial_noise_m", result.noise.axial_m,
@@ -99,7 +99,7 @@ void describe(ResultTable& table, const DepthFusionResult& result) {
   table.add("registration_rounds", result.registration_rounds,
             "number of registration rounds that moved frames");
   table.add("registration_rejected", result.registration_rejected,
-            "true if a registration was not confirmed, or could not be without color");
+            "true if the registration was rejected, or could not be checked without color");
   const auto add_check = [&](const std::string& kind, const PairCosts& costs) {
     const auto if_measured = [&](double cost) {
       return costs.count > 0 ? std::optional(cost) : std::nullopt;

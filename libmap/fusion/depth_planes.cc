@@ -427,7 +427,7 @@ void describe(ResultTable& table, const DepthPixelCounts& counts) {
   table.add("rejected_flying", counts.flying, Merge::sum,
             "number of flying pixels, which are on no surface of their neighbors");
   table.add("rejected_grazing", counts.grazing, Merge::sum,
-            "number of pixels with an incidence above max_incidence_deg");
+            "number of pixels with an angle of incidence above max_incidence_deg");
 }
 
 }  // namespace libmap

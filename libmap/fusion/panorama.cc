@@ -118,11 +118,11 @@ class ViewProjection {
 
 void bind(ParameterTable& table, PanoramaOptions& options) {
   table.add("stride_px", options.stride_px, Range{1, 1e6},
-            "step between the rows and columns that are used, pixels");
+            "step between used rows and columns of an image, pixels; 1: all pixels");
   table.add("flying_pixel_jump_m", options.flying_pixel_jump_m, not_negative,
             "depth difference from both neighbors in a row or column above which a pixel is "
             "dropped, m; 0: no pixel is dropped");
-  table.add("normals", options.normals, "add normals from neighboring pixels");
+  table.add("normals", options.normals, "add normals, from neighboring pixels");
   table.add("normal_jump_m", options.normal_jump_m, positive,
             "maximum depth difference between neighboring pixels of one surface, m");
 }

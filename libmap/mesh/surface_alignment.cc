@@ -21,7 +21,7 @@ void bind(ParameterTable& table, SurfaceAlignmentOptions& options) {
   table.add("icp_max_distance_m", options.max_distance_m, positive,
             "maximum distance between the surface and the points that ICP uses, m");
   table.add("icp_min_overlap", options.min_overlap, zero_to_one,
-            "minimum share of the points that overlap the surface; the alignment fails below it");
+            "minimum share of points that overlap the surface; with fewer, the alignment fails");
   table.add("icp_max_iterations", options.max_iterations, {1.0, 1e6},
             "maximum number of ICP iterations");
   table.add(

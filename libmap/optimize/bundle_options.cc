@@ -24,7 +24,7 @@ void bind(ParameterTable& table, BundleAdjustmentOptions& options) {
             "prior standard deviation of the depth correction's second differences between knots, "
             "relative to the depth noise");
   table.add("depth_knot_m", options.depth_knot_m, {0.02},
-            "distance in depth between the knots of the depth correction, m");
+            "depth interval between the knots of the depth correction, a spline, m");
   table.add("frame_time_s", options.bounds.frame_time_s, positive,
             "maximum depth delay and rolling shutter time that a calibration may contain, s");
   table.add_former_key("max_bend_m", "max_depth_correction_m");

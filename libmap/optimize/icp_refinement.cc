@@ -416,17 +416,17 @@ void bind(ParameterTable& table, IcpOptions& options) {
             "pairs");
   table.add("icp_iterations", options.iterations, {1, 1000}, "maximum number of ICP iterations");
   table.add("icp_pairs", options.pairs_per_frame, {1, 1000},
-            "number of frames with the largest overlap to which global ICP aligns each frame");
+            "with --icp global: number of most overlapping frames to which each frame is aligned");
   table.add("icp_samples", options.samples, {1, 1000000},
             "approximate number of surface samples per frame for ICP");
   table.add(
       "icp_distance_m", options.max_distance_m, positive,
       "first ICP iteration: maximum distance between a sample and another frame's surface, m");
   table.add("icp_degenerate", options.max_degenerate_ratio, zero_to_one,
-            "minimum ratio of an eigenvalue to the largest eigenvalue of an ICP information "
-            "matrix; directions below are ignored");
+            "eigenvalue of ICP's information matrix, relative to the largest, below which motion "
+            "along the eigenvector is ignored");
   table.add("icp_correlation", options.correlation, {1.0},
-            "number of correlated ICP samples that count as one independent sample");
+            "number of ICP samples that count as one, because neighboring samples are correlated");
 }
 
 IcpResult align_surfaces(const std::vector<FrameFeatures>& frames,

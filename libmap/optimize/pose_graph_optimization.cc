@@ -465,15 +465,15 @@ PoseGraphResult Optimization::run() {
 
 void bind(ParameterTable& table, PoseGraphOptions& options) {
   table.add("recalibrate", options.recalibrate,
-            "scale the covariances of each group of links to match the residuals of the group");
+            "scale the covariances of each type of link to match the residuals of its links");
   table.add("recalibrations", options.recalibrations, {1},
             "maximum number of rounds in which the covariances of links are scaled");
   table.add("robust_scale", options.robust_scale, not_negative,
             "width of Cauchy's loss for links, in standard deviations; 0: plain least squares");
   table.add("max_chi_square", options.max_chi_square, positive,
-            "maximum chi-square of a loop closure's residuals; other closures are rejected");
+            "maximum chi-square of a loop closure after optimization; closures above are rejected");
   table.add("gauge_node", options.gauge_node, not_negative,
-            "id of the node whose pose is fixed; 0: the first node of each connected component");
+            "id of the node with a fixed pose; 0: first node of each pose graph component");
 }
 
 PoseGraphResult optimize_pose_graph(const std::map<int, Pose>& map_from_base,

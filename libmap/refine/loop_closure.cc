@@ -85,26 +85,25 @@ bool agree(const FeatureLink& one, const FeatureLink& other, const PoseGraphResu
 
 void bind(ParameterTable& table, LoopClosureDetectionOptions& options) {
   table.add("radius_m", options.radius_m, not_negative,
-            "maximum distance between the two poses of a near loop closure candidate, m");
+            "loop closure candidates by pose: maximum distance between two frames, m");
   table.add("angle_deg", options.angle_deg, {0.0, 180.0},
-            "maximum rotation between the two poses of a near loop closure candidate, degrees");
+            "loop closure candidates by pose: maximum rotation between two frames, degrees");
   table.add("near_candidates", options.near_candidates, not_negative,
-            "maximum number of near loop closure candidates per frame by distance and rotation");
-  table.add(
-      "similar_candidates", options.similar_candidates, not_negative,
-      "maximum number of loop closure candidates per frame by appearance, from the whole scan");
+            "loop closure candidates by pose: maximum number per frame");
+  table.add("similar_candidates", options.similar_candidates, not_negative,
+            "loop closure candidates by image similarity: maximum number per frame");
   table.add("neighbors", options.neighbors, not_negative,
             "number of following frames with which each frame is matched");
-  table.add("max_ratio", options.max_ratio, {0.0, 1.0, true, false},
-            "maximum ratio of the descriptor distances of the best and second-best match of a "
-            "feature");
+  table.add(
+      "max_ratio", options.max_ratio, {0.0, 1.0, true, false},
+      "maximum ratio of descriptor distances: a feature's best match to its second-best match");
   table.add("min_inliers", options.estimate.min_inliers, {6, 100000},
-            "minimum number of matches that agree with the relative pose of two frames");
+            "minimum number of matches that agree with a relative pose of two frames");
   table.add("min_spread", options.estimate.min_spread, not_negative,
-            "minimum spread in the image of matches that agree with a pose, in focal lengths");
+            "minimum width in the image of the area with matches that agree, in focal lengths");
   table.add("max_graph_chi_square", options.max_graph_chi_square, positive,
-            "maximum chi-square of a loop closure's deviation from the pose graph; other closures "
-            "are dropped");
+            "maximum chi-square of the difference between a new loop closure and the pose graph; "
+            "closures above are dropped");
   table.add("words", options.appearance.words, {1, 65536},
             "number of visual words by which the appearance of frames is compared");
 }

@@ -33,18 +33,18 @@ void bind(ParameterTable& table, RefinementOptions& options) {
             {{"fixed", IntrinsicsMode::fixed},
              {"refined", IntrinsicsMode::refined},
              {"auto", IntrinsicsMode::automatic}},
-            "treatment of focal length and principal point; fixed: as stored; refined: estimated; "
-            "auto: estimated if held-out data then fit better");
+            "focal length and principal point; fixed: as stored; refined: estimated; auto: "
+            "estimated if observations not used in the fit then agree better");
   table.add("correct_depth", options.correct_depth,
-            "estimate a depth correction by depth and distance from the image center, and use it "
-            "if held-out data then fit better");
+            "estimate a depth correction (function of depth and distance from the image center); "
+            "used if observations not used in the fit then agree better");
   table.add(
       "register_depth", options.register_depth,
-      "estimate the registration of depth to color, and use it if held-out data then fit better; "
-      "if false, depth edges that are displaced from color edges only cause a warning");
+      "estimate the pose of the depth camera relative to the color camera; used if observations "
+      "not used in the fit then agree better; false: displaced depth edges only cause a warning");
   table.add("estimate_timing", options.estimate_timing,
-            "estimate the delay of depth and the rolling shutter time, and use them if held-out "
-            "data then fit better");
+            "estimate depth delay and rolling shutter time; used if observations not used in the "
+            "fit then agree better");
   table.add("scale_from", options.scale_from,
             {{"depth", ScaleSource::depth}, {"odometry", ScaleSource::odometry}},
             "source of the scale if no scale factor, known length or board is given; depth: depth "
@@ -112,7 +112,7 @@ void describe(ResultTable& table, const RefinementResult& result) {
   table.add("sensor", sensor, "findings about the sensor, such as calibration errors");
   table.add("noise", result.noise, "depth noise and its source");
   table.add("scale", result.scale, "source and uncertainty of the scale");
-  table.add("rejected_stages", rejected, "number of rejected stages");
+  table.add("rejected_stages", rejected, "number of rejected refinement stages");
   table.add("trajectory_rmse_m", rmse_m, "absolute trajectory error against true poses (RMS), m");
   table.add("trajectory_rotation_error_deg", rotation_deg,
             "mean rotation error against true poses, degrees");

@@ -247,7 +247,7 @@ void bind(ParameterTable& table, SerpentineOptions& options) {
             "distance of a serpentine path from the border of the ground, m");
   table.add(
       "ahead_m", options.ahead_m, positive,
-      "distance ahead along a serpentine path of the ground point at which the camera looks, m");
+      "serpentine path: distance along the path from the camera to the viewed ground point, m");
 }
 
 void bind(ParameterTable& table, CameraTrajectoryOptions& options) {

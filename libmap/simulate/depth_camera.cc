@@ -213,7 +213,7 @@ void bind_noise(ParameterTable& table, DepthSensorOptions& options) {
   table.add("max_incidence_deg", options.max_incidence_deg, {0.0, 90.0},
             "maximum angle between ray and normal of measured surfaces, degrees; 90: no limit");
   table.add("edge_gap_m", options.edge_gap_m, positive,
-            "depth discontinuity within a pixel above which it is an edge pixel, m");
+            "depth difference within a pixel above which the pixel is at a depth discontinuity, m");
   table.add("flying_pixels", options.flying_pixels, zero_to_one,
             "share of the pixels at depth discontinuities that mix foreground and background");
   table.add("edge_dropouts", options.edge_dropouts, zero_to_one,

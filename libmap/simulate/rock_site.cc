@@ -135,7 +135,7 @@ ParameterTable field_point_parameters(FieldPointOptions& options) {
   table.add("min_height_m", options.min_height_m, not_negative,
             "minimum height of locations for the field test above the ground, m");
   table.add("radius_m", options.radius_m, Range{0.005, 1.0},
-            "radius of the surface that determines the kind of a field test location, m");
+            "radius of the surface by whose normals a location is classified (flat, edge, ...), m");
   return table;
 }
 

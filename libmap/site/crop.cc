@@ -340,7 +340,7 @@ PointCloud finite_part(const PointCloud& cloud) {
 
 void bind(ParameterTable& table, CropOptions& options) {
   bind(table, options.ground);
-  table.add("center", options.center, "move the center of the outline or map to x = y = 0");
+  table.add("center", options.center, "move the center of the kept area to x = y = 0");
   bind(table, options.rectangle);
   bind(table, options.band);
 }

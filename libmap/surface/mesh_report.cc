@@ -130,8 +130,8 @@ void describe(ResultTable& table, const MeshReport& report) {
   for (const MeshBoundary& boundary : report.boundaries) lengths_m.push_back(boundary.length_m);
   table.add("watertight", report.is_watertight(), "closed, manifold, oriented, not intersecting");
   table.add("manifold", report.is_manifold(),
-            "every edge has at most two triangles, every vertex one fan of triangles");
-  table.add("oriented", report.is_oriented(), "neighboring triangles have the same orientation");
+            "true if every edge has at most two triangles and every vertex one fan of triangles");
+  table.add("oriented", report.is_oriented(), "true if neighbor triangles agree in orientation");
   table.add("components", report.components, "number of components connected by edges");
   table.add("genus", report.genus, "number of handles if manifold and oriented, otherwise -1");
   table.add("boundaries", lengths_m.size(), "number of closed chains of boundary edges");

@@ -481,14 +481,14 @@ double surface_margin_m(const SurfaceReconstructionOptions& options) {
 }
 
 void describe(ResultTable& table, const SurfaceReconstructionResult& result) {
-  table.add("dropped_points", result.dropped_points, "number of points without a normal");
-  table.add("cell_size_m", result.cell_size_m, "size of the cells of the surface, m");
+  table.add("dropped_points", result.dropped_points, "number of dropped points (without normal)");
+  table.add("cell_size_m", result.cell_size_m, "size of the reconstruction's finest cells, m");
   table.add("spacing_m", result.spacing_m, "median distance between neighboring points, m");
   table.add("samples", result.samples, "number of samples to which the points were reduced");
   table.add("octree_depth", result.octree_depth,
             "depth of the octree of method poisson, otherwise 0");
   table.add("trimmed_triangles", result.trimmed_triangles,
-            "number of triangles removed: far from all points, or against their normals");
+            "number of triangles removed: far from points, or opposed to the points' normals");
 }
 
 }  // namespace libmap

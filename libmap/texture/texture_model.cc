@@ -221,13 +221,13 @@ void bind(ParameterTable& table, TextureOptions& options) {
   table.add("texture_size_px", options.atlas.texture_size, {64, 16384},
             "maximum width and height of a texture page, pixels");
   table.add("texel_size_m", options.atlas.texel_size_m, not_negative,
-            "side of a texel on the surface, m; 0: from the number of texels per photograph pixel");
+            "side of a texel (texture pixel) on the surface, m; 0: from --texels-per-pixel");
   table.add("texels_per_pixel", options.atlas.texels_per_pixel, {0.05, 8.0},
-            "number of texels per photograph pixel along one side, if no texel size is given");
+            "if --texel-size is 0: number of texels along one side of a photograph's pixel");
   table.add("max_pages", options.atlas.max_pages, not_negative,
             "maximum number of texture pages; the resolution is reduced to fit; 0: no limit");
   table.add("padding_px", options.atlas.padding_px, {1, 64},
-            "width of the extrapolated border around each connected piece of the texture, texels");
+            "width of the extrapolated border around each piece of the texture, texels");
   table.add("max_incidence_deg", options.views.max_incidence_deg, {0, 90, true, true},
             "maximum angle between viewing ray and surface normal of a used photograph, degrees");
   table.add("max_depth_m", options.views.max_depth_m, not_negative,
@@ -240,12 +240,12 @@ void bind(ParameterTable& table, TextureOptions& options) {
   table.add("border_px", options.views.border_px, not_negative,
             "width of the unused border of each photograph, pixels");
   table.add("seam_cost_m", options.labeling.seam_cost_m, not_negative,
-            "cost of 1 m of seam between photographs, as the area (m2) shown at half of the best "
-            "quality that costs the same; larger values give fewer seams");
+            "cost of 1 m of seam between photographs, in m2 of surface shown at half of the best "
+            "view quality; larger: fewer seams");
   table.add("blend_views", options.blend_views, {1, 16},
             "maximum number of photographs blended at a point; 1: one photograph per triangle");
   table.add("blend_exponent", options.blend_exponent, not_negative,
-            "exponent of a photograph's view quality in its blending weight; 0: equal weights");
+            "blending weight of a photograph: its view quality to this power; 0: equal weights");
   table.add("exposure", options.exposure.gains, "equalize the brightness of the photographs");
   table.add("vignetting", options.exposure.vignetting, "correct the vignetting of the photographs");
   table.add("max_side_m", options.max_side_m, not_negative,
@@ -302,7 +302,7 @@ void describe(ResultTable& table, const TextureCounts& counts) {
             "number of triangles without a photograph");
   table.add("seen_m2", counts.seen_m2, Merge::sum, "area with a photograph, m2");
   table.add("unseen_m2", counts.unseen_m2, Merge::sum, "area without a photograph, m2");
-  table.add("charts", counts.charts, Merge::sum, "number of charts of the texture");
+  table.add("charts", counts.charts, Merge::sum, "number of charts (pieces) of the texture");
   table.add("split_charts", counts.split_charts, Merge::sum,
             "number of charts that were split to fit a page");
   table.add("shrunk_charts", counts.shrunk_charts, Merge::sum,
@@ -312,7 +312,7 @@ void describe(ResultTable& table, const TextureCounts& counts) {
   table.add("atlas_scale", counts.atlas_scale, Merge::min,
             "factor by which the charts were scaled down to fit max_pages; 1: not scaled down");
   table.add("seams_before_m", counts.seams_before_m, Merge::sum,
-            "length of seams with the best photograph for each triangle, m");
+            "length of seams if each triangle showed its best photograph, m");
   table.add("seams_m", counts.seams_m, Merge::sum, "length of seams between photographs, m");
   table.add_hidden("texels", counts.texels, Merge::sum);
 }

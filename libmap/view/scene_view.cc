@@ -264,7 +264,7 @@ void bind(ParameterTable& table, SceneLayer& layer) {
             "value at the lower end of the color scale");
   table.add(
       "range_max", coloring.range_max, any_number,
-      "value at the upper end of the color scale; equal to the lower end: both from the data");
+      "value at the upper end of the color scale; if equal to range_min, both are from the data");
   table.add("single_color", coloring.color, "color for color mode single, #rrggbb or a name");
   table.add("point_shape", layer.point_shape,
             {{"automatic", PointShape::automatic},

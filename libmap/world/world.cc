@@ -123,7 +123,7 @@ void bind(ParameterTable& table, WorldOptions& options) {
             "maximum distance of MuJoCo's height field and balls from the surface, m");
   table.add("ball_radius_m", options.ball_radius_m, positive,
             "maximum radius of the balls that replace cells of MuJoCo's height field, m");
-  table.add("gravity", options.gravity, "downward gravity in m/s2, or of earth, moon or mars");
+  table.add("gravity", options.gravity, "downward gravity, m/s2: a number, or earth, moon or mars");
   table.add("friction", options.friction, not_negative, "coefficient of friction of the ground");
   table.add("restitution", options.restitution, zero_to_one,
             "coefficient of restitution of the ground");
@@ -134,14 +134,14 @@ void bind(ParameterTable& table, WorldOptions& options) {
 void describe(ResultTable& table, const WorldReport& report) {
   table.add("visual_triangles", report.visual_triangles, Merge::sum, "triangles of visual meshes");
   table.add("collision_triangles", report.collision_triangles, Merge::sum,
-            "triangles of the collision meshes");
+            "number of triangles of the collision meshes");
   table.add("collision_deviation_m", report.collision_deviation_m, Merge::max,
             "maximum distance between collision and visual meshes, in both directions, m");
-  table.add("field_nodes", report.field_nodes, Merge::sum, "nodes of the height fields");
+  table.add("field_nodes", report.field_nodes, Merge::sum, "number of height field nodes");
   table.add("field_deviation_m", report.field_deviation_m, Merge::max,
             "maximum distance between height fields and surface, in both directions, m");
   table.add("missing_cells", report.missing_cells, Merge::sum,
-            "cells of the height fields that balls replace");
+            "number of cells of the height fields that balls replace");
   table.add("balls", report.balls, Merge::sum, "balls that replace cells of the height fields");
   table.add("collision_bytes", report.collision_bytes, Merge::sum,
             "size of collision meshes and height fields, bytes");

@@ -1,12 +1,12 @@
-# Virtual field test of the scenarios, and evaluation of its predictors; included by study.mk.
+# Virtual field test of the scenarios (simulated grasps), and evaluation of the maps as predictors of its
+# verdicts; included by study.mk.
 #
-# OUT/N_name/grasp/: PLACES locations spread evenly over the terrain, the maps of all methods looked up
-# there, the verdicts of the virtual field test on the true mesh (table.csv), and the evaluation of each
-# column as a predictor of the verdicts at three loads (evaluation_LOAD/). `again` is the field test with
-# another seed, the upper bound of any prediction. `nz`, the vertical component of the normal, is the
-# slope alone. In scenario 4, `scanned` is the field test on the surface of a simulated scan of the site.
-# OUT/grasp_real/: the field test on the surfaces of the author's clouds, for the bouldering holds with
-# HubRobo.
+# OUT/N_name/grasp/table.csv: PLACES locations spread evenly over the terrain, the values of the maps of
+# all methods there, and the verdicts on the true mesh. For comparison, columns `again`: the field test
+# with another seed, the upper bound of any prediction; `nz`: vertical component of the normal; `scanned`
+# (scenario 4): the field test on the surface of a simulated scan of the site.
+# OUT/N_name/grasp/evaluation_LOAD/: each column as a predictor of the verdicts at one of three loads.
+# OUT/grasp_real/: the field test on surfaces of the author's clouds; bouldering holds: with HubRobo.
 # OUT/grasp_sweep/: scenario 4 with other parameters of the field test.
 
 grasp_methods := thesis envelope climblab corrected calibrated
@@ -20,7 +20,7 @@ commas = $(subst $(space),$(comma),$(strip $(1)))
 grasp_mesh_1 := $(folder_1)/scene.ply
 grasp_scenario_1 := primitive_shapes_prescan
 $(foreach n,1 2 3 4,$(eval grasp_cloud_$(n) := $(folder_$(n))/terrain.pcd))
-# Boxes that keep locations away from the border, where a part of the gripper has no ground below it.
+# Boxes that keep locations away from the border, beyond which fingers have no ground below them.
 grasp_box_1 := -0.8,-0.8,0.8,0.8
 grasp_box_2 := -2.5,-1.9,2.5,1.9
 grasp_box_3 := -1.3,-1.3,1.3,1.3
@@ -28,7 +28,7 @@ grasp_box_4 := -1.3,-1.3,1.3,1.3
 $(foreach n,2 3 4,$(eval grasp_mesh_$(n) := $(folder_$(n))/site.ply) \
   $(eval grasp_scenario_$(n) := $(scenario_$(n))))
 
-# The author's clouds are numbered 5 to 7.
+# Scenarios 5 to 7 are the author's clouds.
 names_real := artificial_rocks primitive_shapes bouldering_holds
 $(foreach n,1 2 3,$(eval name_$(words 1 2 3 4 $(wordlist 1,$(n),1 2 3)) := thesis_$(word $(n),$(names_real))))
 $(foreach n,5 6 7,$(eval folder_$(n) := $(OUT)/grasp_real/$(name_$(n))) \

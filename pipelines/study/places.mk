@@ -1,7 +1,7 @@
 # Look-up of the field test's locations in every map of scenarios 2 to 4; included by study.mk.
 #
-# OUT/N_name/METHOD/table.csv has one row per location and one column per case, as the thesis's tables
-# B 2-3 (score at the location, and 1 or 0 by the combined criterion) and, for the wall, B 2-4
+# OUT/N_name/METHOD/table.csv has one row per location and one column per case, as tables B 2-3 of the
+# thesis (score at the location; 1 or 0 by score and convexity combined) and, for the wall, B 2-4
 # (graspability of a hold). In situ, a location has a value only if the robot measured a point near it.
 # The wall's cases are evaluated against its pre-scanned map: METHOD/evaluation/.
 

@@ -1,4 +1,4 @@
-# Inclination of the robot's body on the rocks (chapter 5.2.3); included by study.mk.
+# Inclination of the robot's body on the rocks (thesis, chapter 5.2.3); included by study.mk.
 #
 # OUT/4_artificial_rocks/poses/planes.csv: angle between the true ground and the regression plane of the
 # robot's panorama, in degrees, with the body level and inclined by each of INCLINATIONS (degrees) to

@@ -1,8 +1,8 @@
-# Steep walls of the rocks evaluated as walls (chapter 6.2); included by study.mk.
+# Map of the steep sides of the rocks (thesis, chapter 6.2); included by study.mk.
 #
-# OUT/4_artificial_rocks/walls/: the pre-scanned map with the mask along the surface normal and
-# with flags of ground that is too high or too steep (surface/), footholds on it for a planner, and the
-# changes against the upright mask (analysis/).
+# OUT/4_artificial_rocks/walls/: the pre-scanned map with the mask along the surface normal and with
+# flags of obstacles (surface/), the map's footholds, and the changes against the upright mask
+# (analysis/).
 
 ifneq ($(and $(filter walls,$(STAGES)),$(filter 4,$(SCENARIOS)),$(filter corrected,$(METHODS))),)
 folder_walls := $(folder_4)/walls

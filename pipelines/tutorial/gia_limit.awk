@@ -3,7 +3,8 @@
 # Gravito-Inertial Acceleration", CLAWAR 2020; ClimbLab's gia_limit): about the axis through the
 # footholds a and b, the robot tumbles when
 #   m a_gi . n > F_j . ((p_b - p_j) x (p_a - p_j)),   n = (p_g - p_a) x (p_g - p_b),
-# where F_j is the downward force that the gripper at the third foothold j holds (pull_away_n).
+# with mass m, acceleration a_gi, footholds p_a, p_b, p_j, and center of mass p_g. F_j is the downward
+# force that the gripper at the third foothold j holds (pull_away_n).
 # Input: a table of `graspmap footholds --mesh`. The first three footholds are used.
 # Variables: mass (kg), height (height of the center of mass above the footholds' mean, m).
 BEGIN { FS = "," }

@@ -24,7 +24,8 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
   libgtd::bind(table, options.trials);
 }
 
-// None: an exact mesh; "mesh": by its vertex field expected_error; else a standard deviation, m.
+// Returns the errors of `mesh`; None: no errors; "mesh": from its vertex field expected_error; a
+// number: standard deviation of all vertices, m. Throws Error for other values.
 libgtd::GroundErrors errors_of(const libmap::TriangleMesh& mesh, const py::object& given,
                                const libgtd::SurfaceErrorOptions& bounds) {
   if (given.is_none()) return {};
@@ -41,7 +42,7 @@ libgtd::GroundErrors errors_of(const libmap::TriangleMesh& mesh, const py::objec
                        .bound = "None, \"mesh\", or 0 to max_surface_error_m, m"});
 }
 
-// One row for each location.
+// Returns an array with a row of `width` numbers for each location.
 template <typename NumbersOf>
 py::array_t<double> table_of(const Results& results, std::size_t width,
                              const NumbersOf& numbers_of) {

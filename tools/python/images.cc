@@ -67,7 +67,7 @@ py::bytes to_png(const py::object& pixels) {
 
 }  // namespace
 
-// A cloud or a mesh; two arrays of two dimensions are the vertices and triangles of a mesh.
+// Converts a cloud or a mesh; two arrays of two dimensions are vertices and triangles of a mesh.
 template <>
 struct Argument<Shown> {
   static Shown from(const py::object& given, const std::string& name) {

@@ -25,14 +25,14 @@ struct ScoreOptions {
 void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   libgtd::bind(table, options.detection);
   table.add("frame", options.frame, libgtd::map_frame_names(),
-            "frame of the map's points; terrain: terrain frame; input: frame of the scored cloud");
+            "frame of the map's points; terrain: as set by --plane; input: frame of the cloud");
 }
 
 ScoreOptions score_options(const std::optional<std::string>& scenario,
                            const std::optional<Eigen::Vector3d>& up, const py::dict& values) {
   ScoreOptions options;
   if (scenario) options.detection = libgtd::read_scenario(*scenario);
-  options.detection.gripper.reset();  // an option may name another
+  options.detection.gripper.reset();  // `values` may name another gripper
   options = options_from(values, std::move(options));
   options.detection.scenario.check();
   if (!up) return options;
@@ -65,7 +65,7 @@ py::dict score(const PointCloud& terrain, const std::optional<std::string>& scen
   return made;
 }
 
-// Values of each field; NaN where nothing was found.
+// Returns an array of values for each field of the map; NaN for an answer that is not `found`.
 py::dict values_of(const PointCloud& map, const std::vector<libgtd::LookupAnswer>& answers) {
   py::dict dict;
   for (std::size_t field = 0; field < map.fields.size(); ++field)
@@ -110,7 +110,7 @@ py::dict footholds(const PointCloud& map, const Eigen::Vector3d& up, const py::d
   return made;
 }
 
-// Returns a list of texts for each column.
+// Returns the cells of each column, as texts.
 py::dict columns_of(const libmap::Table& table) {
   py::dict dict;
   for (std::size_t column = 0; column < table.columns.size(); ++column) {

@@ -18,7 +18,7 @@ using libmap::PoseSource;
 using libmap::RgbdFrame;
 using libmap::ScanSource;
 
-// Trajectory of a separate type, which pybind11 does not convert to a list.
+// Trajectory in a class of its own, because pybind11 would convert a vector to a list.
 struct Poses {
   libmap::Trajectory poses;
 };
@@ -35,7 +35,7 @@ namespace {
 constexpr PoseSource sources[] = {PoseSource::optimized, PoseSource::odometry,
                                   PoseSource::ground_truth};
 
-// Column of a field of each pose.
+// Returns the array of one field of all poses; `row` and `strides` describe the field of one pose.
 template <typename Number, typename FieldOf>
 py::array pose_view(const py::object& self, Shape row, Shape strides, const FieldOf& field_of) {
   const libmap::Trajectory& poses = self.cast<Poses&>().poses;

@@ -17,7 +17,7 @@ using libmap::ScalarField;
 using libmap::ScalarType;
 using libmap::TriangleMesh;
 
-// NumPy's names of the types, by ScalarType.
+// NumPy's name of each ScalarType, in the order of the enumeration.
 constexpr const char* type_names[] = {"int8",  "uint8",  "int16",   "uint16",
                                       "int32", "uint32", "float32", "float64"};
 
@@ -79,7 +79,7 @@ ScalarType type_of(const py::array& array) {
   const auto* const found = std::find(std::begin(type_names), std::end(type_names), name);
   if (found != std::end(type_names)) return static_cast<ScalarType>(found - std::begin(type_names));
   if (name == "bool") return ScalarType::uint8;
-  // Files have no integers of 64 bits.
+  // Other integers become float64, because cloud files have no 64-bit integers.
   return array.dtype().kind() == 'f' ? ScalarType::float32 : ScalarType::float64;
 }
 

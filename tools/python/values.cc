@@ -19,7 +19,7 @@ std::string short_repr(py::handle value) {
   return text.size() <= longest ? text : text.substr(0, longest) + "...";
 }
 
-// Shape and type of an array, the value of a text or a number, the type of another object.
+// Describes shape and type of an array, the value of a text or number, or the type of an object.
 std::string outline(py::handle given) {
   if (py::hasattr(given, "shape") || py::isinstance<py::list>(given) ||
       py::isinstance<py::tuple>(given)) {
@@ -118,7 +118,7 @@ py::array checked_array(const py::object& given, const std::string& name, const 
   const char kind = array.dtype().kind();
   const bool has_type = numbers.kinds.find(kind) != std::string_view::npos &&
                         (numbers.bytes == 0 || numbers.bytes == array.itemsize());
-  // An empty list has NumPy's default type.
+  // NumPy converts an empty list to float64, whatever type is required.
   if (has_type || (array.size() == 0 && kind == 'f')) return array;
   throw wrong_value(array, name, bound);
 }
@@ -230,7 +230,7 @@ void CallProgress::end() {
   stage_.clear();
 }
 
-// No thread waits for mutex_ while it has the interpreter's lock, so that there is no deadlock.
+// No thread waits for mutex_ while it holds the interpreter's lock, which would allow a deadlock.
 void CallProgress::call() {
   const py::gil_scoped_acquire acquired;
   last_call_ = std::chrono::steady_clock::now();

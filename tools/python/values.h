@@ -1,5 +1,5 @@
 // Converts values between Python and the libraries: arrays, options, results, errors, progress, and
-// the arguments of calls. Errors about an argument name its parameter.
+// arguments of calls. Errors name the parameter.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -38,8 +38,8 @@ namespace py = pybind11;
 
 using Shape = std::vector<py::ssize_t>;
 
-// Returns a read-only array that uses the memory of `owner` and keeps `owner` alive. `strides` are
-// in bytes; empty: the array is dense.
+// Returns a read-only array of the numbers at `data`, which `owner` owns and the array keeps alive.
+// `strides`: bytes per step along each axis; empty: dense, row by row.
 template <typename Number>
 py::array view(const Number* data, Shape shape, py::handle owner, Shape strides = {}) {
   py::array array(py::dtype::of<Number>(), std::move(shape), std::move(strides), data, owner);
@@ -47,13 +47,13 @@ py::array view(const Number* data, Shape shape, py::handle owner, Shape strides 
   return array;
 }
 
-// Returns a property getter: view_of makes an array on the member, which keeps the object alive.
+// Returns a property getter: view_of(object.*member, object), for example a call of view().
 template <typename Object, typename Member, typename ViewOf>
 auto viewing(Member Object::*member, ViewOf view_of) {
   return [=](const py::object& self) { return view_of(self.cast<Object&>().*member, self); };
 }
 
-// Returns an array with one number per item.
+// Returns the array of number_of(item) for each of `items`.
 template <typename Number, typename Items, typename NumberOf>
 py::array_t<Number> column(const Items& items, const NumberOf& number_of) {
   py::array_t<Number> array(static_cast<py::ssize_t>(items.size()));
@@ -69,22 +69,22 @@ inline Shape rows(std::size_t count, py::ssize_t width) {
 // Returns the error of a parameter whose value `given` has a wrong type or shape.
 libmap::Error wrong_value(py::handle given, const std::string& name, const std::string& bound);
 
-// Throws Error for the first keyword in `others`, which are not names of `parameters`; if there is
-// none, for the first of `missing`, required parameters without a value.
+// Throws Error for the first of `others`, keywords that are not names of `parameters`, or else for
+// the first of `missing`, required parameters without a value.
 void check_names(const std::vector<std::string>& parameters, const std::vector<std::string>& others,
                  const std::vector<std::string>& missing);
 
 // Returns the bound "one of NAME NAME ...".
 std::string one_of(const std::vector<std::string>& names);
 
-// Accepted types of an array: NumPy's letters, and the size of a number in bytes (0: any).
+// Accepted types of an array: NumPy's kind letters, and the size of a number in bytes (0: any).
 struct Numbers {
   std::string_view kinds;
   py::ssize_t bytes = 0;
 };
 constexpr Numbers byte_numbers = {"u", 1}, whole_numbers = {"iu"}, real_numbers = {"iuf"};
 constexpr Numbers indices_or_truth = {"biu"}, real_or_truth = {"biuf"};
-constexpr py::ssize_t any_length = -1;  // in a Shape: any number
+constexpr py::ssize_t any_length = -1;
 
 // Returns `given` as an array. Throws Error with `name` and `bound` for another type or shape.
 py::array checked_array(const py::object& given, const std::string& name, const Numbers& numbers,
@@ -104,8 +104,8 @@ Eigen::Vector3d vector_from(const py::object& given, const std::string& name);
 libmap::Pose pose_from(const py::object& given, const std::string& name);  // 4 x 4, rigid
 py::array matrix_of(const libmap::Pose& pose);
 
-// Sets the table's parameters by their keys. A dict in the dict is a section, as in YAML. Throws
-// what ParameterTable::set throws, and Error for a value that is no truth value, number or text.
+// Sets the table's parameters by their keys; a dict in a dict is a section, as in YAML. Throws what
+// ParameterTable::set throws, and Error for a value that is no truth value, number or text.
 void set_options(const libmap::ParameterTable& table, const py::dict& values);
 
 template <typename Options>
@@ -119,8 +119,8 @@ Options options_from(const py::dict& values, Options options = {}) {
 // Returns a dict of the results by key; a missing value is None.
 py::dict dict_of(const libmap::ResultTable& table);
 
-// Return a dict per parameter (key, type, default, choices, description) or result not in
-// `objects`.
+// Return one dict per parameter (key, type, default, choices, description), or per result (key,
+// type, description) whose key is not in `objects`.
 py::list list_of(const libmap::ParameterTable& table);
 py::list list_of(const libmap::ResultTable& table, const std::vector<std::string>& objects);
 
@@ -130,8 +130,8 @@ struct Stage {
   std::function<py::list()> results;
 };
 std::vector<Stage>& stages();
-// Registers a stage with its options and results, for documentation and stubs. `objects` are keys
-// of results that are objects in Python, not numbers or texts.
+// Registers a stage with its options and results for the documentation and the stubs. `objects`:
+// keys of results that Python returns as objects, not as numbers or texts.
 template <typename Options, typename... Results>
 void add_stage(const std::string& name, const std::vector<std::string>& objects = {}) {
   const auto options = [] {
@@ -148,8 +148,8 @@ void add_stage(const std::string& name, const std::vector<std::string>& objects 
   stages().push_back({name, options, results});
 }
 
-// Calls callback(stage, done, total) when a stage begins or ends, and at most ten times a second
-// meanwhile. Handles Ctrl-C. An exception of the callback ends the work.
+// Calls callback(stage, done, total) when a stage begins and ends, and between at most ten times a
+// second. An exception of the callback, or KeyboardInterrupt after Ctrl-C, ends the work.
 class CallProgress : public libmap::Progress {
  public:
   explicit CallProgress(py::object callback) : callback_(std::move(callback)) {}
@@ -168,7 +168,8 @@ class CallProgress : public libmap::Progress {
   std::chrono::steady_clock::time_point last_call_{};
 };
 
-// Calls step(progress) without the interpreter's lock, on at most `threads` threads (0: all).
+// Returns step(progress), called without the interpreter's lock on at most `threads` threads (0:
+// all processors). Throws Error for more than 4096 threads or a callback that is not callable.
 template <typename Step>
 auto run(unsigned threads, const py::object& callback, const Step& step) {
   constexpr unsigned max_threads = 4096;
@@ -190,8 +191,8 @@ auto without_lock(const Step& step) {
   return step();
 }
 
-// Calls write(temporary), then moves the temporary file to `path`. Throws Error if `path` has a
-// manifest, which would describe an earlier output.
+// Calls write(temporary), then moves the file to `path`. Throws Error if the path has a manifest,
+// which would describe an earlier output.
 template <typename Write>
 void write_whole(const std::filesystem::path& path, const Write& write) {
   if (std::filesystem::exists(libmap::manifest_path(path)))
@@ -211,7 +212,7 @@ std::shared_ptr<T> shared(T&& value) {
 
 py::dict numbers_of(const std::vector<std::pair<std::string, double>>& numbers);
 
-// Converts C++ errors of the libraries and the file system to graspmap.Error in Python.
+// Registers the conversion of C++ errors of libraries and file system to graspmap.Error.
 void translate_errors();
 
 // Add classes and functions to the module.
@@ -311,7 +312,7 @@ struct Argument<std::vector<Eigen::Vector3d>> {
   }
 };
 
-// Accepts any iterable except a text.
+// Converts each item of any iterable except a text.
 template <typename T>
 struct Argument<std::vector<T>> {
   static std::vector<T> from(const py::object& given, const std::string& name) {
@@ -325,7 +326,7 @@ struct Argument<std::vector<T>> {
   }
 };
 
-// Accepts None, or a T.
+// Accepts None, which becomes nullopt or nullptr, or a value of the type.
 template <typename T>
 struct Argument<std::optional<T>> {
   static std::optional<T> from(const py::object& given, const std::string& name) {
@@ -354,7 +355,7 @@ decltype(auto) call(const Function& function, const std::array<py::object, sizeo
 template <typename>
 using Given = const py::object&;
 
-// Value of a required parameter for which the call has no argument.
+// Default that marks a required parameter without an argument in the call.
 inline py::object missing_value() { return py::reinterpret_borrow<py::object>(Py_NotImplemented); }
 inline py::arg_v with_default(const py::arg& required) {
   return {required.name, missing_value(), "..."};
@@ -372,7 +373,7 @@ void check_given(const std::array<const char*, count>& names,
   check_names({names.begin(), names.end()}, unknown, missing);
 }
 
-// Returns the function with checked arguments, for pybind.
+// Wraps a function for pybind11: checks the names of the arguments and converts their values.
 template <typename Result, typename... Types>
 auto checked(Result (*function)(Types...), std::array<const char*, sizeof...(Types)> names) {
   return [=](Given<Types>... given, const py::kwargs& others) -> Result {
@@ -382,7 +383,7 @@ auto checked(Result (*function)(Types...), std::array<const char*, sizeof...(Typ
   };
 }
 
-// Returns a method with checked arguments, without the object itself.
+// Wraps a method likewise; `self` has no name and is not converted.
 template <typename Result, typename Self, typename... Types>
 auto checked(Result (*method)(const Self&, Types...),
              std::array<const char*, sizeof...(Types)> names) {
@@ -400,7 +401,7 @@ void define(py::module_& module, const char* name, Result (*function)(Types...),
   module.def(name, checked(function, parameters));
 }
 
-// Parameters are py::arg; those without a default value are required.
+// Each of `parameters` is a py::arg, which is required unless it has a default value.
 template <typename Class, typename Method, typename... Parameters>
 void define_method(Class& type, const char* name, Method method, const char* documentation,
                    const Parameters&... parameters) {

@@ -263,10 +263,10 @@ void Command::preset(const std::string& key, std::function<fs::path(const std::s
 
 void Command::Parts::add_common_options() {
   if (!table.parameters().empty()) {
-    app.add_option("--config", config, "YAML file of parameters; flags take precedence")
+    app.add_option("--config", config, "YAML file with values of parameters; flags take precedence")
         ->type_name("FILE.yaml");
     app.add_option("--set", overrides,
-                   "value of one parameter by its key in a --config file (repeatable)")
+                   "value of one parameter; KEY as in --print-config; repeatable")
         ->type_name("KEY=VALUE")
         ->allow_extra_args(false);
     app.add_flag("--print-config", print_config, "print the effective parameters as YAML and exit");
@@ -276,7 +276,7 @@ void Command::Parts::add_common_options() {
   app.add_option("--threads", threads, "number of threads; 0: all processors")->type_name("N");
   app.add_option("--progress", progress, "progress display: auto, json, none")->type_name("STYLE");
   app.add_flag("--quiet", run_options.quiet, "print warnings and errors only");
-  app.add_flag("--verbose", run_options.verbose, "also print the time of each step");
+  app.add_flag("--verbose", run_options.verbose, "also print the computing time of each step");
 }
 
 void Command::Parts::add_parameter_flags() {

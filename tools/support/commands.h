@@ -13,7 +13,7 @@ struct CommandEntry {
 };
 
 constexpr CommandEntry commands[] = {
-    {"Scan", "simulate", "simulate terrains, sites, scans and robot cameras with known truth"},
+    {"Scan", "simulate", "simulate terrains, sites, scans and depth images with ground truth"},
     {"Scan", "calibrate", "calibrate a camera from images of a chessboard"},
     {"Scan", "refine", "refine the poses of a scan: loop closures, pose graph, bundle adjustment"},
     {"Scan", "fuse", "fuse the depth images of a scan or a camera rig into one cloud"},
@@ -21,8 +21,8 @@ constexpr CommandEntry commands[] = {
     {"Surface", "texture", "texture a mesh with the images of its scan"},
     {"Surface", "crop", "level a cloud or mesh and crop it to the test site"},
     {"Surface", "resample", "sample a surface evenly (Poisson disk)"},
-    {"Surface", "compare", "measure distances between surfaces, or heights along a site's edges"},
-    {"Map", "mask", "write the mask of a gripper as text, cloud or image"},
+    {"Surface", "compare", "measure distances between surfaces, or height errors along site edges"},
+    {"Map", "mask", "write the voxel mask of a gripper as text, cloud or image"},
     {"Map", "score", "compute the graspability map of a terrain, tile by tile"},
     {"Map", "analyze", "analyze a map, compare it with another, or tabulate several maps"},
     {"Map", "footholds", "list the best footholds of a map for a step planner"},

@@ -12,8 +12,8 @@ namespace graspmap_tools {
 
 void bind(libmap::ParameterTable& table, MapTableOptions& options) {
   table.add("cutoff", options.cutoff,
-            "for several maps: minimum score of a graspable voxel; auto: threshold in each map's "
-            "manifest");
+            "for several maps: minimum score of a graspable voxel; auto: threshold with which each "
+            "map was scored");
   table.add("names", options.names,
             "for several maps: names of the maps, separated by |; default: names of the files");
   table.add("pairs", options.pairs, "for several maps of one cloud: compare all pairs of maps");

@@ -25,7 +25,7 @@ std::string json_text(const TileFolder::TileData& json) {
 
 void add_share_option(Command& command, std::string& share) {
   command.option("--tile", "K/N", share,
-                 "compute only share K of N of the tiles; the last share completes the folder");
+                 "compute only share K of N (1/N) of the tiles; all N shares complete the folder");
 }
 
 void require_folder_of_share(const std::string& output, const std::string& share) {

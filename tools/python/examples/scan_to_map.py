@@ -29,7 +29,7 @@ scored = graspmap.score(fused.cloud, voxel_size_m=max(0.01, voxel_size_m))
 ground, score = scored.map.positions, scored.map.fields["score"]
 print(f"{len(score)} voxels, {scored.graspable_voxels} graspable")
 
-# %% Where to put the grippers
+# %% The best footholds of the map
 best = graspmap.footholds(scored.map, separation_m=0.3, max_count=20, graspable_only=False)
 places = best.cloud.positions
 

@@ -1,4 +1,4 @@
-"""Checks the names of a call's arguments before Python does, which would raise a TypeError."""
+"""Checks the names of a call's arguments, so that a wrong name raises `Error`, not TypeError."""
 
 import functools
 import inspect
@@ -8,7 +8,7 @@ from . import _core
 
 
 def checked(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Returns the function; it raises `Error` for an unknown keyword and for a missing argument."""
+    """Returns `function`, wrapped to raise `Error` for an unknown keyword or a missing argument."""
     parameters = inspect.signature(function).parameters
     takes_options = any(one.kind is one.VAR_KEYWORD for one in parameters.values())
     names = [name for name, one in parameters.items() if one.kind is not one.VAR_KEYWORD]

@@ -24,7 +24,7 @@ class Cloud:
     fields : dict of array_like, shape (N,), optional
         Values of each field by name. Files store the numbers with the array's type.
     viewpoint : array_like, shape (4, 4), optional
-        Pose of the sensor: rigid transform cloud_from_sensor, m. Default: identity, for unknown.
+        Pose of the sensor: rigid transform cloud_from_sensor, m. Default: identity (unknown).
 
     Raises
     ------
@@ -201,7 +201,7 @@ class Frame:
     """
     @property
     def node(self) -> int:
-        """Number of the node."""
+        """Id of the node."""
     @property
     def stamp_s(self) -> float:
         """Time of the images, s."""
@@ -220,16 +220,16 @@ class Frame:
         """Right image of a stereo pair: array (height, width) of uint8, or None."""
 
 class Poses:
-    """Poses of a scan's nodes.
+    """Poses of a scan's nodes; a node is one recorded frame.
 
     Parameters
     ----------
     nodes : array_like of int, shape (N,)
-        Numbers of the nodes.
+        Ids of the nodes.
     world_from_base : array_like, shape (N, 4, 4)
         Rigid transforms from the robot's base to the world, m.
     stamps_s : array_like, shape (N,), optional
-        Times, s.
+        Time stamps, s. Default: 0 (unknown).
 
     Raises
     ------
@@ -246,10 +246,10 @@ class Poses:
                  stamps_s: ArrayLike | None = None) -> None: ...
     @property
     def nodes(self) -> NDArray[np.int32]:
-        """Numbers of the nodes, 0 if unknown: array (N,) of int32."""
+        """Ids of the nodes, 0 if unknown: array (N,) of int32."""
     @property
     def stamps_s(self) -> NDArray[np.float64]:
-        """Times, s, 0 if unknown: array (N,) of float64."""
+        """Time stamps, s, 0 if unknown: array (N,) of float64."""
     @property
     def world_from_base(self) -> NDArray[np.float64]:
         """Rigid transforms from the robot's base to the world, m: array (N, 4, 4) of float64."""
@@ -273,10 +273,10 @@ class Scan:
         """Warnings about parts of the scan that could not be read when it was opened."""
     @property
     def nodes(self) -> NDArray[np.int32]:
-        """Numbers of the nodes, ascending: array (N,) of int32."""
+        """Ids of the nodes, ascending: array (N,) of int32."""
     @property
     def stamps_s(self) -> NDArray[np.float64]:
-        """Times of the nodes, s: array (N,) of float64."""
+        """Time stamps of the nodes, s: array (N,) of float64."""
     @property
     def pose_sources(self) -> list[str]:
         """Sources of poses that the scan has: 'optimized', 'odometry', 'ground-truth'."""
@@ -309,7 +309,7 @@ class Scan:
         Parameters
         ----------
         node : int
-            Number of the node, one of `nodes`.
+            Id of the node, one of `nodes`.
         color : bool
             True to decode the color image.
         depth : bool
@@ -335,7 +335,7 @@ class Scan:
     def __len__(self) -> int:
         """Number of nodes."""
 
-# Functions that _stages.py and _files.py call; stages return the fields of their results as a dict.
+# Functions that _stages.py and _files.py call. Stages return the fields of their results as a dict.
 _Path = str | PathLike[str]
 _Progress = Callable[[str, int, int], None] | None
 _Cloud = Cloud | ArrayLike

@@ -23,7 +23,7 @@ Options = Mapping[str, Any] | None
 
 
 def merged(options: Options, values: Mapping[str, Any]) -> Any:
-    """Returns one dict; keyword arguments take precedence. The extension module rejects other types."""
+    """Returns one dict of both; `values` take precedence. The extension module rejects other types."""
     if options is None or isinstance(options, Mapping):
         return {**(options or {}), **values}
     return options
@@ -39,7 +39,7 @@ def open_scan(path: Path, calibration: Path | None = None) -> Scan:
     path : path
         Database or folder.
     calibration : path, optional
-        Camera from `graspmap refine --write-calibration`, instead of the stored one.
+        Calibration file from `graspmap refine --write-calibration`. Default: as stored in the scan.
 
     Returns
     -------
@@ -69,8 +69,8 @@ def read_poses(path: Path, scan: Scan | None = None, *, options: Options = None,
     path : path
         File of poses, or folder of a COLMAP model.
     scan : Scan, optional
-        Scan to whose nodes the poses are assigned, as by `graspmap fuse --poses FILE`. Default: nodes
-        and times are from the file, or 0.
+        Scan to whose nodes the poses are assigned, as by `graspmap fuse --poses FILE`. Default: node
+        ids and times are from the file, or 0 if the file has none.
     options : mapping, optional
         Options by name; keyword arguments take precedence.
     **values
@@ -105,7 +105,7 @@ def write_poses(path: Path, poses: Poses, *, nodes: bool = False) -> None:
     poses : Poses
         Poses to write.
     nodes : bool
-        True to write the node's number as a ninth column of a .tum file.
+        True to write the node ids as the ninth column of a .tum file.
 
     Raises
     ------
@@ -224,12 +224,12 @@ def read_manifest(path: Path) -> dict[str, Any] | None:
     Parameters
     ----------
     path : path
-        Output of a command; its manifest is PATH.json.
+        Output of a command, whose manifest is PATH.json.
 
     Returns
     -------
     dict or None
-        Content of the manifest; None if there is none.
+        Content of the manifest; None if PATH.json does not exist.
 
     Raises
     ------

@@ -53,17 +53,18 @@ class RefineResult(_fields.RefineFields, Result):
     poses : Poses
         Refined poses.
     nodes_without_pose : list of int
-        Nodes that are not connected to the largest component of the pose graph.
+        Ids of the nodes that are not connected to the largest component of the pose graph.
     nodes_without_links : list of int
-        Nodes without links; the graph does not refine their poses.
+        Ids of the nodes without links in the pose graph, whose poses are therefore not refined.
     skipped : list of (int, str)
         Nodes whose images could not be used, each with the reason.
     stages : list of dict
         Entry of each stage: name, rejected (True if its poses were not used), seconds, figures (dict of
-        metrics); held_out_matches and held_out_surfaces (costs before and after the stage);
-        trajectory_rmse_m and trajectory_rotation_error_deg if the scan has true poses.
+        metrics); held_out_matches and held_out_surfaces (costs before and after the stage of
+        observations that it does not use); if the scan has true poses, trajectory_rmse_m and
+        trajectory_rotation_error_deg.
     findings : list of str
-        Findings about the sensor, one sentence each.
+        Findings about the sensor, such as calibration errors, one sentence each.
     warnings : list of str
         Warnings of the refinement.
     """
@@ -112,7 +113,7 @@ class NormalsResult(Result):
     undefined : int
         Number of normals that are zero.
     oriented_by : str
-        Criterion that determined the side to which the normals point.
+        Criterion that determined to which side of the surface the normals point.
     """
 
     cloud: Cloud
@@ -172,11 +173,11 @@ class ScoreResult(_fields.ScoreFields, Result):
     terrain_from_input : array, shape (4, 4), float64
         Rigid transform from the frame of the input to the terrain frame, m.
     zero_plane_m : float or None
-        Height of the zero plane in the terrain frame, m; None if there is no zero plane.
+        Minimum z of graspable voxels in the terrain frame, m; None: no minimum.
     voxel_size_m : float
         Side of the voxels, m.
     obstacle_voxels : int
-        Number of voxels that are obstacles.
+        Number of voxels that are obstacles or unreachable; 0 if obstacles are not evaluated.
     timings_s : dict of float
         Time of each step, s.
     """
@@ -192,7 +193,7 @@ class ScoreResult(_fields.ScoreFields, Result):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class GraspResult(Result):
-    """Virtual field test of N locations, from `grasp`.
+    """Simulated grasps at N locations, from `grasp`.
 
     Attributes
     ----------
@@ -203,9 +204,9 @@ class GraspResult(Result):
     hold_low, hold_high : array, shape (N,), float64
         Limits of Wilson's 95 % interval of the probability.
     force_n : array, shape (N, 3), float64
-        Quantiles 0.1, 0.5 and 0.9 of the holding force over the trials, N.
+        Quantiles 0.1, 0.5 and 0.9 over the trials of the holding force in the weakest direction, N.
     force_range_n : array, shape (N, 2), float64
-        Quantiles 0.05 and 0.95 of the holding force, N.
+        Quantiles 0.05 and 0.95 of the same force, N.
     trial_spread : array, shape (N,), float64
         Standard deviation of ln(force) between trials of one parameter set.
     parameter_spread : array, shape (N,), float64
@@ -213,15 +214,15 @@ class GraspResult(Result):
     best_force_n : array, shape (N, 3), float64
         As force_n, but with the best distribution of the load over the spines, N.
     unseen : array, shape (N,), float64
-        Mean share of unseen ground under the fingers.
+        Mean fraction of the ground below the fingers that is unmeasured or too inaccurate.
     trials : array, shape (N,), int64
         Number of trials.
     directions : list of str
         Names of the 17 directions of the pulls.
     pull_limits_n : array, shape (N, 17), float64, or None
-        Pull that nine of ten trials hold in each direction, N; None without `pull_limits`.
+        Pull that 90 % of the trials hold in each of `directions`, N; None without `pull_limits`.
     columns : dict of list of str
-        Columns of the table that `graspmap grasp` writes, by name.
+        Result columns of the table that `graspmap grasp` writes: texts of the N cells by name.
     """
 
     holds: NDArray[np.bool_]
@@ -264,13 +265,14 @@ class LookupResult(Result):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class FootholdsResult(_fields.FootholdsFields, Result):
-    """Best locations of a map, best first, from `footholds`.
+    """K best locations of a map, best first, from `footholds`.
 
     Attributes
     ----------
     cloud : Cloud
-        K locations with normals, the fields of the map, and the fields approach_x, approach_y,
-        approach_z, slope_deg, k1, k2 (1/m), mean_score and graspable_points.
+        Locations with normals, the fields of the map, and the fields approach_x, approach_y, approach_z
+        (unit vector of the gripper's motion), slope_deg, k1, k2 (principal curvatures, 1/m), mean_score
+        and graspable_points (of the neighborhood).
     map_point : array, shape (K,), int64
         Index of each location in the map.
     """
@@ -286,7 +288,7 @@ class EvaluateResult(Result):
     Attributes
     ----------
     areas : dict of float or None
-        Area under the ROC curve of each column, by trapezoids; None unless both labels occur.
+        Area under the ROC curve of each score column, by trapezoids; None unless both labels occur.
     summary : dict
         Content of summary.json of the command.
     summary_json : str

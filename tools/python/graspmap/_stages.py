@@ -59,8 +59,8 @@ def refine(scan: Scan, *, known_lengths: Sequence[str] = (), board: str | None =
     scan : Scan
         Scan with images, depth and cameras.
     known_lengths : sequence of str
-        Measured distances between two points, each given by node and pixel of its image:
-        "NODE:X:Y-NODE:X:Y=METERS", as --known-length.
+        Measured distances between two points, each given by the node id and a pixel of the node's
+        image: "NODE:X:Y-NODE:X:Y=METERS", as --known-length.
     board : str, optional
         Static chessboard in the scene: numbers of inner corners and side of a square,
         "COLUMNSxROWS:METERS", as --board.
@@ -261,7 +261,7 @@ def score(terrain: CloudLike, *, scenario: str | None = None, up: ArrayLike | No
     terrain : Cloud or array_like, shape (N, 3)
         Points of the ground, m.
     scenario : str, optional
-        Name of a scenario, or its file, as --config; options take precedence.
+        Parameter set: a name in data/scenarios, or a file, as --config; options take precedence.
     up : array_like, shape (3,), optional
         Direction in the cloud's frame that points out of the ground. Default: as --up auto, by the
         viewpoint, the normals or the z axis.
@@ -315,9 +315,9 @@ def grasp(mesh: MeshLike, points: ArrayLike, *,  # pylint: disable=redefined-out
     more_loads_n : sequence of float
         Additional loads to test, N; their results are in `GraspResult.columns`.
     sequential : bool
-        True to end the test of a location as soon as its verdict is certain.
+        True to end the trials at a location as soon as it is certain whether most hold.
     pull_limits : bool
-        True to compute the force that nine of ten trials hold, for each of 17 directions.
+        True to compute the pull that 90 % of the trials hold, in each of 17 directions.
     options : mapping, optional
         Options by name; keyword arguments take precedence.
     progress : callable, optional
@@ -330,7 +330,7 @@ def grasp(mesh: MeshLike, points: ArrayLike, *,  # pylint: disable=redefined-out
     Returns
     -------
     GraspResult
-        Verdicts and forces of the N locations:
+        Hold probabilities and forces at the N locations:
 
     Raises
     ------
@@ -357,7 +357,7 @@ def lookup(map: CloudLike, points: ArrayLike, *,  # pylint: disable=redefined-bu
     Parameters
     ----------
     map : Cloud or array_like, shape (M, 3)
-        Map with its fields; positions in m.
+        Map points, m, with their fields.
     points : array_like, shape (N, 3)
         Points in the map's frame, m.
     options : mapping, optional
@@ -394,10 +394,10 @@ def footholds(map: CloudLike, *,  # pylint: disable=redefined-builtin
     Parameters
     ----------
     map : Cloud
-        Map with the fields of `ScoreResult.map`; positions in m.
+        Map points, m, with the fields of `ScoreResult.map`.
     up : array_like, shape (3,)
-        Direction in the map's frame that points out of the ground; the default is right for maps in
-        the terrain frame.
+        Direction in the map's frame that points out of the ground. Default: z, as for maps in the
+        terrain frame.
     options : mapping, optional
         Options by name; keyword arguments take precedence.
     threads : int
@@ -453,7 +453,7 @@ def evaluate(table: Mapping[str, Sequence[Any]], *, scores: Sequence[str] = (),
     table : mapping of array_like, shape (N,)
         Columns by name: a dict, or a data frame of pandas. None, NaN and "" are missing values.
     scores : sequence of str
-        Columns to evaluate. Default: all numeric columns that are no ids, positions or lengths.
+        Columns to evaluate. Default: all numeric columns that are not ids, positions or lengths.
     options : mapping, optional
         Options by name; keyword arguments take precedence.
     threads : int
