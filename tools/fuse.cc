@@ -242,8 +242,9 @@ void check_registration(const libmap::ScanSource& scan, const FuseOptions& optio
   if (!edges.is_displaced()) return;
   if (edges.is_scaled())
     throw libmap::Error(edges.sentence() +
-                            "; set depth_calibration in scan.yaml (convert a database first: "
-                            "graspmap convert SCAN -o FOLDER), or use --no-color",
+                            "; in scan.yaml, set depth_calibration to the calibration file of the "
+                            "depth camera (convert a database first: graspmap convert SCAN -o "
+                            "FOLDER), or use --no-color",
                         {.file = options.scan, .field = "depth_calibration"});
   run.warn("{}: {}; refine --write-calibration estimates the registration for --calibration",
            options.scan, edges.sentence());

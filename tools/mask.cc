@@ -30,7 +30,7 @@ struct MaskOptions {
 // Options of sections only.
 void bind_sections(libmap::ParameterTable& table, MaskOptions& options) {
   table.add("section_layer", options.section_layer, {0, 1e6},
-            "with --sections: layer in the lower horizontal section; 0: the lowest layer");
+            "with --sections: layer that the second horizontal section shows; 0: lowest");
   table.add("cell_width_px", options.cell_width_px, {64, 5000}, "image width of a section, pixels");
 }
 

@@ -287,7 +287,8 @@ int main(int argc, char** argv) {
   command.inputs("SCAN", options.scans,
                  "scan: an RTAB-Map database, or a folder of images; several scans of overlapping "
                  "ground, or a folder of databases, are joined");
-  command.output(options.output, "refined poses (.tum, .kitti, .g2o, .toro, or a folder .colmap)");
+  command.output(options.output,
+                 "refined poses (.tum, .kitti, .g2o, .toro, or a folder NAME.colmap)");
   command.option("--links", "LINKS.g2o", options.links, "output for the refined pose graph");
   command.option(
       "--write-database", "OUT.db", options.database,

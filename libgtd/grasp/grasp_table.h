@@ -8,8 +8,8 @@
 
 namespace libgtd {
 
-// Returns the names of the columns: graspable (1 or 0, the verdict for `evaluate`), probability,
-// forces, contacts, failures; for each further load L (N) also graspable_L, hold_probability_L.
+// Returns the names of the columns, e.g. graspable (1 or 0, the result for `evaluate`) and
+// hold_probability; for each further load L (N) also graspable_L and hold_probability_L.
 std::vector<std::string> grasp_columns(const std::vector<double>& extra_loads_n = {});
 
 // Returns the cells of one location, one per column.

@@ -52,10 +52,10 @@ class Ground {
   Ground(Ground&&) noexcept;
   Ground& operator=(Ground&&) noexcept;
 
-  // Returns all triangles that intersect a cylinder, and some other triangles. The axis passes
-  // through `location` along `away`, which points out of the ground (both in the mesh frame). The
-  // cylinder extends from `above_m` above the location to the lowest point of the mesh. At depth d
-  // below the location, the radius is radius_m + widening * max(above_m, d). Thread-safe.
+  // Returns all triangles that intersect a cylinder that widens downwards, and some others. The
+  // axis passes through `location` along `away`, which points out of the ground (both in the mesh
+  // frame). The solid extends from `above_m` above the location to the lowest point of the mesh.
+  // Its radius at depth d below the location is radius_m + widening * max(above_m, d). Thread-safe.
   GroundPatch patch(const Eigen::Vector3d& location, const Eigen::Vector3d& away, double radius_m,
                     double above_m, double widening = 0.0) const;
 

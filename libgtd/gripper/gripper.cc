@@ -59,8 +59,9 @@ void bind(libmap::ParameterTable& table, GripperFingers& fingers) {
   table.add(
       "fingers.curl_deg", fingers.curl_deg, {0.0, 90.0},
       "inward angle from the proximal to the distal link of a finger without contact, degrees");
-  table.add("fingers.curl_limit_deg", fingers.curl_limit_deg, {0.0, 170.0},
-            "maximum inward angle of the distal link when the proximal link is stopped, degrees");
+  table.add(
+      "fingers.curl_limit_deg", fingers.curl_limit_deg, {0.0, 170.0},
+      "maximum inward angle of the distal link after the ground stops the proximal link, degrees");
   table.add("fingers.spines_per_finger", fingers.spines_per_finger, {1, 1000},
             "number of spines per finger");
   table.add("fingers.spine_tip_radius_um", fingers.spine_tip_radius_um, {0.0, 1000.0, true, false},

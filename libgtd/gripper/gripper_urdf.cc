@@ -181,8 +181,9 @@ std::vector<FingerNames> matching_fingers(const UrdfMapping& mapping, const Robo
       fingers.push_back(finger);
   }
   if (fingers.empty())
-    throw Error("no joint matches this pattern together with urdf.spine_joint or urdf.tip_link",
-                {.field = "urdf.finger_joint", .value = pattern});
+    throw Error(
+        "no matching joint has a urdf.spine_joint or urdf.tip_link with the same text for '*'",
+        {.field = "urdf.finger_joint", .value = pattern});
   return fingers;
 }
 

@@ -51,9 +51,9 @@ struct MatchingLoops {
                    std::size_t length, std::uint32_t* totals);
 
   // Writes the voxel number of each point inside the box, in the order of the points, and returns
-  // the number of values. `points` are coordinates, one array per axis. Up to `lanes` points beyond
-  // `count` are read and included in the result, so that some points may occur twice; `cells` needs
-  // this room, too.
+  // the number of values. `points` are coordinates, one array per axis. Up to `lanes` points after
+  // the first `count` are read and treated alike; a caller that continues with them gets them
+  // twice. `cells` needs room for count + lanes values.
   std::size_t (*find_cells)(const double* const points[3], std::size_t count,
                             const TiltedLattice& lattice, const TiltedBox& box, int* cells);
   // Returns the number of bits that are set in both `a` and `b`.

@@ -347,11 +347,11 @@ double choose_up(const Facts& facts, const RegressionPlaneOptions& options, cons
     const double tilt_deg = std::acos(std::min(1.0, std::abs(side))) * 180.0 / std::numbers::pi;
     if (tilt_deg > options.max_tilt_deg)
       throw libmap::Error(
-          "the fitted plane is too steep: if heights such as 0 or -9999 mark missing data, declare "
-          "them with gdal_translate -a_nodata",
-          {.field = "tilt of the plane, deg",
-           .value = libmap::to_fixed_text(tilt_deg, 1),
-           .bound = "<= " + libmap::to_text(options.max_tilt_deg)});
+          "too steep; if 0 or -9999 marks missing heights, declare it with gdal_translate "
+          "-a_nodata",
+          {.field = "tilt of the plane",
+           .value = libmap::to_fixed_text(tilt_deg, 1) + " deg",
+           .bound = "<= " + libmap::to_text(options.max_tilt_deg) + " deg"});
     return side;
   }
   double side = 0;

@@ -101,8 +101,8 @@ void visit_columns(const VoxelGrid& grid, const TileBounds& columns, const Visit
   });
 }
 
-// Voxelizes points (terrain frame, m) for `corrected`: index = floor(p / voxel_size_m) on the
-// lattice through the origin, independent of the rest of the cloud. Throws Error naming
+// Voxelizes points (terrain frame, m) for the method `corrected`: index = floor(p / voxel_size_m)
+// on the lattice through the origin, independent of the rest of the cloud. Throws Error naming
 // voxel_size_m if an index is outside +-2^29.
 VoxelGrid voxelize(const std::vector<Eigen::Vector3d>& points_in_terrain, double voxel_size_m);
 
@@ -111,14 +111,14 @@ VoxelGrid voxelize(const std::vector<Eigen::Vector3d>& points_in_terrain, double
 // Throws like voxelize.
 libmap::PointCloud voxel_means(const libmap::PointCloud& terrain, double voxel_size_m);
 
-// Voxelizes points for `thesis` (listing A.4), in single precision: the centroids of the cells of
-// one lattice are put into the cells of a second lattice, which starts at the minimum of the
-// points.
+// Voxelizes points for the method `thesis` (listing A.4), in single precision: the centroids of the
+// cells of one lattice are put into the cells of a second lattice, which starts at the minimum of
+// the points.
 VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
                           double voxel_size_m);
 
 // Returns the centroid of the points in each cell floor(p * (1 / leaf_m)) in single precision, in
-// ascending order of z, y, x, as the author's program does before and during voxelization.
+// ascending order of z, y, x, as the thesis's program does before and during voxelization.
 std::vector<Eigen::Vector3f> voxel_centroids(const std::vector<Eigen::Vector3f>& points,
                                              double leaf_m);
 

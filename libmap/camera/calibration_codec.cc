@@ -121,15 +121,14 @@ Calibration read_records(std::string_view bytes) {
   ByteReader reader(bytes);
   while (!reader.empty()) {
     const std::string_view rest = reader.rest();
-    if (!begins_with_record(rest)) throw Error("a record is invalid", {.field = "calibration"});
+    if (!begins_with_record(rest)) throw Error("invalid", {.field = "records"});
     if (rest[12] == 0)
       calibration.cameras.push_back(read_record(reader));
     else
       calibration.stereo.push_back(read_stereo_record(reader));
   }
   if (!calibration.cameras.empty() && !calibration.stereo.empty())
-    throw Error("contains both single and stereo cameras, which is not supported",
-                {.field = "calibration"});
+    throw Error("both single and stereo ones, which is not supported", {.field = "cameras"});
   return calibration;
 }
 
@@ -245,7 +244,7 @@ Camera camera_of(const CalibrationRecord& record, int width, int height) {
     camera.cy = record.k[5];
     set_distortion(camera, record.d);
   } else {
-    throw Error("contains neither K nor P", {.field = "calibration"});
+    throw Error("both are missing", {.field = "K and P"});
   }
   camera.check();
   return camera;
@@ -283,19 +282,18 @@ std::string to_text(CalibrationLayout layout) {
 }
 
 Calibration decode_calibration(std::string_view bytes) {
-  if (bytes.empty()) throw Error("empty", {.field = "calibration"});
+  if (bytes.empty()) throw no_elements("bytes");
   if (begins_with_record(bytes)) {
     try {
       return read_records(bytes);
     } catch (const std::length_error&) {
       throw Error("truncated after " + std::to_string(bytes.size()) + " bytes",
-                  {.field = "calibration"});
+                  {.field = "records"});
     }
   }
   const auto layout = floats_layout(bytes);
   if (!layout)
-    throw Error("unknown layout of " + std::to_string(bytes.size()) + " bytes",
-                {.field = "calibration"});
+    throw Error("unknown", {.field = "layout", .value = std::to_string(bytes.size()) + " bytes"});
   return read_floats(bytes, layout->first, layout->second);
 }
 

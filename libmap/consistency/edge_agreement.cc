@@ -401,14 +401,14 @@ std::string EdgeAgreement::sentence() const {
   if (!is_displaced()) return {};
   const double turn_deg =
       rotation_vector_of(color_from_depth.linear()).norm() * 180.0 / std::numbers::pi;
-  const std::string found = "depth is not registered to color: edges of depth are " +
-                            to_fixed_text(displacement_px, 0) + " +- " +
-                            to_fixed_text(uncertainty_px, 0) +
-                            " px from edges of the images, as from a depth camera ";
+  const std::string found =
+      "depth is not registered to color: depth edges are " + to_fixed_text(displacement_px, 0) +
+      " +- " + to_fixed_text(uncertainty_px, 0) + " px from image edges, as if the depth camera ";
   if (is_scaled())
-    return found + "of " + to_fixed_text(focal_factor, 2) + " times the focal length";
-  return found + to_fixed_text(1e3 * color_from_depth.translation().norm(), 0) + " mm and " +
-         to_fixed_text(turn_deg, 1) + " deg away";
+    return found + "had " + to_fixed_text(focal_factor, 2) + " times the stored focal length";
+  return found + "were displaced by " +
+         to_fixed_text(1e3 * color_from_depth.translation().norm(), 0) + " mm and " +
+         to_fixed_text(turn_deg, 1) + " deg";
 }
 
 EdgeAgreement check_edge_agreement(const ScanSource& scan) {

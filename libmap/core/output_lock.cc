@@ -62,7 +62,10 @@ FileLock& FileLock::operator=(FileLock&& other) noexcept {
 
 std::optional<FileLock> FileLock::try_lock(const fs::path& path) {
   FileLock lock(open_lock(path));
-  if (flock(lock.descriptor_, LOCK_EX | LOCK_NB) != 0) return std::nullopt;
+  if (flock(lock.descriptor_, LOCK_EX | LOCK_NB) != 0) {
+    if (errno == EWOULDBLOCK) return std::nullopt;
+    throw system_failure(path, "cannot be locked", errno);
+  }
   return lock;
 }
 

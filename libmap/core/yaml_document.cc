@@ -100,7 +100,7 @@ void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
                 const std::string& whose) {
   std::set<std::string> seen;
   for (const auto& entry : map) {
-    if (!entry.first.IsScalar()) throw Error("is not a single value", {.field = "key"});
+    if (!entry.first.IsScalar()) throw Error("not a name", {.field = "key of a mapping"});
     const std::string& key = entry.first.Scalar();
     if (std::find(known.begin(), known.end(), key) == known.end())
       throw unknown_key(key, known, whose);

@@ -13,7 +13,7 @@
 namespace libmap {
 
 struct NormalEstimationOptions {
-  int neighbors = 16;  // 3 to 1000: nearest points to which a plane is fitted, with the point
+  int neighbors = 16;  // 3 to 1000: number of points of a plane fit, including the point itself
 };
 void bind(ParameterTable& table, NormalEstimationOptions& options);
 
@@ -36,8 +36,8 @@ struct NormalEstimationResult {
 // Fits planes by total least squares (Hoppe et al. 1992, section 3.2). If the cloud has no sensor
 // position, orientations are propagated along the minimum spanning tree of the graph of neighbors,
 // weighted by the angle between normals (section 3.3). Each component is then oriented away from
-// its center or up, whichever is more distinct. The result does not depend on the number of
-// threads. Throws Error if an option is out of range or the cloud is inconsistent.
+// its center or up, whichever direction its normals are more parallel to on average. Throws Error
+// if an option is out of range or the cloud is inconsistent.
 NormalEstimationResult estimate_normals(const PointCloud& cloud,
                                         const NormalEstimationOptions& options = {});
 

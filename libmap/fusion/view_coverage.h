@@ -24,8 +24,8 @@ struct FrameCoverage {
 
 class ViewCoverage {  // information of all frames that were added
  public:
-  // Returns true if, at over 5 % of its pixels, the frame adds more than 1/views to the information
-  // of the pixel's cell.
+  // Returns true if over 5 % of the frame's pixels are in cells that are new, or in which the frame
+  // adds more than 1/views of the present information.
   bool is_improved_by(const FrameCoverage& frame, double views) const;
   void add(const FrameCoverage& frame);
 

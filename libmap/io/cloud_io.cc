@@ -205,6 +205,10 @@ std::vector<std::filesystem::path> cloud_tiles(const std::filesystem::path& give
   if (tiles.empty())
     throw Error("the folder contains no cloud (.pcd, .ply, .csv, .tif)", {.file = given.string()});
   std::sort(tiles.begin(), tiles.end());
+  for (const std::filesystem::path& tile : tiles)
+    if (is_dem_path(tile) != is_dem_path(tiles.front()))
+      throw Error("DEMs and clouds have different frames; use separate folders",
+                  {.file = tile.string()});
   return tiles;
 }
 
@@ -213,11 +217,9 @@ CloudReadResult read_cloud(const std::filesystem::path& path,
   if (std::filesystem::is_directory(path)) {
     CloudReadResult joined;
     const std::vector<std::filesystem::path> tiles = cloud_tiles(path);
-    const auto first_frame = is_dem_path(tiles.front()) ? read_georeference(tiles.front()) : frame;
+    const auto first_frame =
+        !frame && is_dem_path(tiles.front()) ? read_georeference(tiles.front()) : frame;
     for (const std::filesystem::path& tile : tiles) {
-      if (is_dem_path(tile) != is_dem_path(tiles.front()))
-        throw Error("DEMs and clouds have different frames; use separate folders",
-                    {.file = tile.string()});
       CloudReadResult read = read_cloud(tile, first_frame);
       append_cloud(read.cloud, joined.cloud);
       joined.dropped_points += read.dropped_points;

@@ -39,7 +39,8 @@ struct CloudReadResult {
 };
 
 // Returns the file itself, or the cloud files of a folder in the order of names, without hidden
-// files. Throws Error if the file is missing or not a cloud, or the folder contains no cloud file.
+// files. Throws Error if the file is missing or not a cloud, or the folder contains no cloud file
+// or both DEMs and other clouds.
 std::vector<std::filesystem::path> cloud_tiles(const std::filesystem::path& file_or_folder);
 
 // Reads a file, or all files of a folder into one cloud with the info of the last file. A file

@@ -176,9 +176,6 @@ TileStream::TileStream(std::vector<fs::path> tiles) : tiles_(std::move(tiles)) {
   fs::path first;
   for (const fs::path& tile : tiles_) {
     const CloudBlockReader reader(tile, georeference_);
-    if (is_dem_path(tile) != is_dem_path(tiles_.front()))
-      throw Error("DEMs and clouds have different frames; use separate folders",
-                  {.file = tile.string()});
     if (!georeference_) georeference_ = reader.georeference();
     if (reader.is_empty()) continue;
     if (is_first) {

@@ -165,7 +165,7 @@ void bind(ParameterTable& table, PoissonDiskOptions& options) {
       "radius_m", options.radius_m, positive,
       "minimum distance between samples and maximum distance from the surface to a sample, m");
   table.add("count", options.count, {0.0, max_samples},
-            "number of samples, reached within 1 %; replaces the minimum distance; 0: not used");
+            "number of samples, usually within 1 %, instead of --radius; 0: not used");
   table.add("seed", options.seed, {}, "random seed of the samples");
 }
 

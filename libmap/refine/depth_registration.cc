@@ -43,8 +43,9 @@ CoarseRegistration register_coarsely(const ScanSource& scan, bool may_register) 
   if (!may_register) return registration;
   if (edges.is_scaled())
     throw Error(edges.sentence() +
-                    "; set depth_calibration in scan.yaml (convert a database first: graspmap "
-                    "convert SCAN -o FOLDER), or use --no-register-depth",
+                    "; in scan.yaml, set depth_calibration to the calibration file of the depth "
+                    "camera (convert a database first: graspmap convert SCAN -o FOLDER), or use "
+                    "--no-register-depth",
                 {.field = "depth_calibration"});
   registration.finding += ": registered by edges before refinement";
   registration.color_from_depth = edges.color_from_depth;

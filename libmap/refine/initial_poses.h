@@ -16,7 +16,7 @@ struct InitialPoses {
   std::map<int, Pose> map_from_base;
   // Groups of nodes (sessions, joined by links) with poses in one coordinate frame; nodes ascend.
   std::vector<std::vector<int>> parts;
-  std::vector<int> without_pose;  // nodes without a pose, except with GraphNode::invalid_weight
+  std::vector<int> without_pose;  // valid nodes (not GraphNode::invalid_weight)
   std::string source;             // "odometry", "stored", "links", or "visual" (no poses)
 };
 
@@ -26,8 +26,8 @@ struct InitialPoses {
 // poses. Throws Error if `start` is odometry or stored and the scan has no poses of this source.
 InitialPoses initial_poses(const PoseGraph& graph, StartPoses start);
 
-// Joins parts that are connected by links: transforms the smaller part rigidly to satisfy the link
-// to the larger part with which most of these links agree. Returns all remaining parts.
+// Joins parts that are connected by links. The smaller part is moved rigidly so that one link to
+// the larger part is satisfied: the link that most others agree with. Returns all remaining parts.
 std::vector<std::vector<int>> join_parts(std::map<int, Pose>& map_from_base,
                                          const std::vector<std::vector<int>>& parts,
                                          const std::vector<PoseLink>& links);

@@ -44,7 +44,7 @@ struct RefinementState {
   std::set<FramePair> tried_pairs{};       // pairs of frames that have been matched
   PoseGraphResult graph{};                 // links: other_links, then feature_links
   std::vector<TrackingLoss> losses{};      // of visual odometry
-  BlockSystem information{0};              // information matrix of steps of `poses`, in their order
+  BlockSystem information{0};              // information matrix of pose errors, order of `poses`
   bool is_from_bundle = false;             // the information is from a bundle adjustment
   std::vector<FramePair> surface_pairs{};  // pairs of frames that ICP has aligned
   double surface_distance_m = 0.0;         // IcpResult::max_distance_m
@@ -65,7 +65,7 @@ inline constexpr const char* depth_link_group = "depth odometry";  // GraphLink:
 CalibrationInput calibration_input(const RefinementInput& input, const RefinementState& state,
                                    const std::vector<GraphLinkResult>& other_links);
 
-// Returns the frames as if recorded with the calibration.
+// Returns a copy of the stored frames with the calibration applied.
 SharedFrames calibrated(const std::vector<FrameFeatures>& stored,
                         const SensorCalibration& calibration);
 
@@ -111,11 +111,11 @@ BlockSystem information_of(const RefinementInput& input, const RefinementState& 
 // Aligns depth images by ICP: all overlapping images, or only linked images (IcpOptions::mode).
 StageResult surface_stage(const RefinementInput& input, const RefinementState& state);
 
-// Steps by node. A node's pose has one step per independent direction of the calibration: its
-// change if the calibration changes by one standard deviation in this direction.
+// Pose changes by node: one per independent direction of the calibration's error, for an error of
+// one standard deviation in this direction.
 using CalibrationMoves = std::map<int, std::vector<Vector6d>>;
-// Returns the steps to first order; empty if state.calibration is empty. Sets `deviations` to the
-// standard deviations of intrinsics and timing.
+// Returns the linearized changes, divided by state.deviation_scale; empty without a calibration or
+// a solution. Sets `deviations` to the standard deviations of intrinsics and timing.
 CalibrationMoves calibration_moves(const RefinementInput& input, const RefinementState& state,
                                    SensorCalibration& deviations);
 

@@ -35,7 +35,7 @@ std::vector<Swatch> swatches() {
   all.push_back({"c7", no_value_color, "no value"});
   all.push_back({"c8", below_plane_color, "below the zero plane"});
   all.push_back({"convex", convex_color, "convex"});
-  all.push_back({"graspable", intersection_color, "graspable"});
+  all.push_back({"graspable", graspable_color, "graspable"});
   all.push_back({"obstacle", obstacle_color, "obstacle"});
   all.push_back({"rest", rest_color, "other"});
   return all;

@@ -13,7 +13,7 @@
 //     - name: left
 //       calibration: left.yaml            # ... or a camera file, relative to this file
 //       position_m: [0.1, 0.17, 0.1]      # instead of robot_from_camera: pose of the camera's body
-//       roll_pitch_yaw_deg: [0, 0, 60]    # frame (x forward, z up, REP-103; about fixed axes)
+//       roll_pitch_yaw_deg: [0, 0, 60]    # frame (x forward, z up); angles about fixed axes
 //       far_m: 2.0                        # replaces the rig's far_m (also depth_scale_m, near_m)
 //
 // robot_from_camera is the pose of the optical frame (z forward). A camera without a pose in this
@@ -115,10 +115,10 @@ SynchronizedSet synchronized_set_at(const std::vector<RigImage>& images, std::si
 SynchronizedSet fullest_synchronized_set(const std::vector<RigImage>& images,
                                          std::size_t camera_count, double tolerance_s);
 
-// Splits a recording into sets, ascending by stamp; each image is in exactly one set. Repeatedly,
-// the earliest remaining image begins a set. The set is at the stamp of a remaining image, at most
-// `tolerance_s` later, at which it contains this image and the most cameras; ties are resolved as
-// in fullest_synchronized_set.
+// Splits a recording into sets, ascending by stamp; each image is in exactly one set. Each set
+// contains the earliest remaining image. Its stamp is that of a remaining image, at most
+// `tolerance_s` later: the stamp whose set has the most cameras; ties are resolved as in
+// fullest_synchronized_set.
 std::vector<SynchronizedSet> synchronized_sets(const std::vector<RigImage>& images,
                                                std::size_t camera_count, double tolerance_s);
 

@@ -354,19 +354,22 @@ std::array<Vector2d, 4> corners_of(const std::array<Side, 4>& sides) {
 }  // namespace
 
 void bind(ParameterTable& table, BorderBandOptions& options) {
-  table.add("white_level", options.white_level, {0.0, 255.0},
-            "border: brightness (minimum of red, green and blue, 0 to 255) from which a color is "
-            "white; 0: determined from the colors");
+  table.add(
+      "white_level", options.white_level, {0.0, 255.0},
+      "with --border: brightness (minimum of red, green and blue, 0 to 255) from which a color is "
+      "white; 0: determined from the colors");
   table.add("max_band_width_m", options.max_width_m, positive,
-            "border: maximum width of the band, m");
+            "with --border: maximum width of the band, m");
   table.add("min_band_side_m", options.min_side_m, positive,
-            "border: minimum side of the area inside the band, m");
+            "with --border: minimum side of the area inside the band, m");
   table.add("min_band_seen", options.min_seen, {0.0, 1.0, true, false},
-            "border: minimum share of each side's length along which the band is visible");
+            "with --border: minimum share of each side's length along which the band is visible");
   table.add("band_cell_m", options.cell_m, positive,
-            "border: cell size of the top view in which the band is detected, m");
-  table.add("min_band_z_m", options.min_z_m, any_number, "border: minimum height of the band, m");
-  table.add("max_band_z_m", options.max_z_m, any_number, "border: maximum height of the band, m");
+            "with --border: cell size of the top view in which the band is detected, m");
+  table.add("min_band_z_m", options.min_z_m, any_number,
+            "with --border: minimum z of the white band above the ground, m");
+  table.add("max_band_z_m", options.max_z_m, any_number,
+            "with --border: maximum z of the white band above the ground, m");
 }
 
 BorderBand find_border_band(const PointCloud& level_cloud, double margin_m,

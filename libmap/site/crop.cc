@@ -166,7 +166,7 @@ void require_sound(const CropOptions& options) {
     throw Error("a margin requires a size or a border",
                 {.field = "margin_m", .value = to_text(options.rectangle.margin_m)});
   if (options.frame == CropFrame::map && found)
-    throw Error("a size or a border requires the level frame",
+    throw Error("--size and --border require the frame 'level'",
                 {.field = "frame", .value = "map", .bound = "level"});
   if (options.yaw_deg && !std::isfinite(*options.yaw_deg))
     throw Error("not a finite angle", {.field = "yaw", .value = to_text(*options.yaw_deg)});

@@ -19,7 +19,7 @@ void bind(ParameterTable& table, EdgeCheckOptions& options) {
   table.add("positions_per_edge", options.positions_per_edge, {1.0, 10000.0},
             "number of measured positions along each edge of the site");
   table.add("inset_m", options.inset_m, not_negative,
-            "distance of the measured positions from the edge of the site, inwards, m");
+            "distance from the site's edge, inwards, at which heights are compared, m");
 }
 
 namespace {

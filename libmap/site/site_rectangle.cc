@@ -256,7 +256,7 @@ std::string gap_remedy(const std::vector<Vector2d>& points, const Vector2d& size
 
 void bind(ParameterTable& table, SiteRectangleOptions& options) {
   table.add("site_cell_m", options.cell_m, positive,
-            "cell size of the mask of the measured area in which the site is searched, m");
+            "cell size of the grid in which the site is searched, m; larger for large areas");
   table.add("max_gap_m", options.max_gap_m, not_negative,
             "maximum size of ignored holes in the measured area: side of a square that fits in, m");
   table.add("margin_m", options.margin_m, not_negative,

@@ -32,8 +32,9 @@ struct SurfaceTileOptions {
 // Returns the box of a tile, enlarged by a margin on each side.
 XyBox xy_box_of(const XyTile& tile, double tile_m, double margin_m);
 
-// Adds, for each tile that may contain a part of the cloud's surface, the number of points near the
-// tile (surface_margin_m() + max_hole_m). Throws Error if tile_m is too small for the coordinates.
+// Adds, for each tile that may contain a part of the surface, the number of points within reach of
+// it: surface_margin_m (surface_reconstruction.h) plus max_hole_m. Throws Error if tile_m is too
+// small for the coordinates.
 void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& options,
                        std::map<XyTile, std::size_t>& points_in_tiles);
 
@@ -51,9 +52,9 @@ struct SurfaceTile {
 
 // Reconstructs the surface of one tile from the `points` within margin_m() of it; `statistics` are
 // the statistics of the whole cloud. The surface equals the result of reconstruct_surface() and
-// clean_mesh() for the whole cloud, with two exceptions. Small components (islands) at the margin
-// are kept, for SurfaceIslands. Holes beside islands narrower than min_island_area_m2 / margin_m()
-// may stay open. Throws Error as options.check(), reconstruct_part and clean_mesh do.
+// clean_mesh() for the whole cloud, with two exceptions. Small components (islands) that extend
+// beyond the margin are kept, for SurfaceIslands. A hole beside a narrow island may stay open.
+// Throws Error as options.check(), reconstruct_part and clean_mesh do.
 SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& statistics,
                               const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress = no_progress());

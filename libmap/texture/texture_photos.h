@@ -37,7 +37,7 @@ class PhotoProjector {
 
   // Returns an upper bound, in pixels, of the projected length of any segment of length `length_m`
   // within the ball: 0 only if the ball is outside the photograph, infinite if the camera is in the
-  // ball or the field of view is unknown. Assumes that distortion enlarges at most twice.
+  // ball or the field of view is unknown. Assumes that distortion at most doubles lengths.
   double max_pixels(const Eigen::Vector3d& center, double radius_m, double length_m) const;
 
  private:
@@ -56,7 +56,7 @@ struct TexturePhoto {
   double sharpness = 1.0;  // relative to the median of all photographs
 };
 
-// Minimum depth in each square cell of a photograph, to find views beside an occluder.
+// Minimum depth in each square cell of a photograph, to find triangles seen close to an occluder.
 class OccluderCells {
  public:
   // Side of a cell in pixels; 0 disables the search.
@@ -67,9 +67,10 @@ class OccluderCells {
   // Adds a surface point by pixel and z (m) in the camera's frame. Ignored if z is not positive or
   // the pixel is outside the photograph.
   void add(float x, float y, float z);
-  // Returns true if an added point p in the pixel's cell or its eight neighbors is more than
-  // `gap_m` above the plane: normal . (p - camera) > height_m + gap_m. The normal is in world axes
-  // and faces the camera. The pixel must be inside the photograph.
+  // Returns true if the nearest point of the pixel's cell, or of one of its eight neighbors, is
+  // more than `gap_m` in front of the plane normal . (p - camera) = height_m; p is at the cell's
+  // center. The normal is in world axes and faces the camera. The pixel must be inside the
+  // photograph.
   bool has_any_above(float x, float y, const Eigen::Vector3d& normal, double height_m,
                      double gap_m) const;
 

@@ -196,13 +196,13 @@ void color_by_flags(const ColorSource& source, const Coloring& coloring, Colored
   const std::vector<double> obstacle =
       has_obstacles ? values_of(source, "obstacle") : std::vector<double>(count, 0.0);
   for (std::size_t i = 0; i < count; ++i)
-    result.colors.push_back(graspable[i] > 0.0  ? intersection_color
+    result.colors.push_back(graspable[i] > 0.0  ? graspable_color
                             : obstacle[i] > 1.0 ? unreachable_color
                             : obstacle[i] > 0.0 ? obstacle_color
                             : convex[i] > 0.0   ? convex_color
                                                 : rest_color);
   result.legend.title = "graspable areas";
-  if (has_graspable) result.legend.entries.push_back({intersection_color, "intersection"});
+  if (has_graspable) result.legend.entries.push_back({graspable_color, "graspable"});
   if (has_obstacles) {
     result.legend.entries.push_back({obstacle_color, "steep face"});
     result.legend.entries.push_back({unreachable_color, "out of reach"});

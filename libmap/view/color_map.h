@@ -101,8 +101,9 @@ Color color_at(ColorScale scale, double t);
 // Throws Error, which names `field`, for any other text.
 Color parse_color(std::string_view text, const std::string& field);
 
+// Colors of mode `flags`: fields "convex", "graspable", "obstacle" 1 and 2, and the rest.
 inline constexpr Color convex_color{40, 90, 220};
-inline constexpr Color intersection_color{0, 100, 0};
+inline constexpr Color graspable_color{0, 100, 0};
 inline constexpr Color obstacle_color{178, 60, 40};
 inline constexpr Color unreachable_color{235, 170, 90};
 inline constexpr Color rest_color{211, 211, 211};

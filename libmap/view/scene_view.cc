@@ -71,7 +71,7 @@ Setup gather(const Scene& scene) {
       setup.layers.push_back(std::move(prepared));
     }
   }
-  if (positions.empty()) throw Error("none to draw has finite coordinates", {.field = "points"});
+  if (positions.empty()) throw Error("none has finite coordinates", {.field = "points to draw"});
   for (Marker marker : scene.markers) {
     marker.position = scene.terrain_from_scene * marker.position;
     setup.markers.push_back(marker);

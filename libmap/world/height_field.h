@@ -36,7 +36,7 @@ struct HeightField {
 // or the grid has more than 2^26 nodes.
 HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions& options);
 
-// True for a triangle above or below a missing cell; may also be true if it is near such a cell.
+// True if a missing cell is in the triangle's box in x and y: the field may omit a part of it.
 bool may_be_left_out(const HeightField& field, const TriangleMesh& mesh, const Triangle& triangle);
 
 }  // namespace libmap

@@ -195,7 +195,7 @@ class Errors(unittest.TestCase):
                 (graspmap.lookup, [empty, [[0, 0, 0]]], "points"),
                 (graspmap.mesh, [graspmap.Cloud(plain().positions)], "normals")]:
             error = self.error(function, *arguments)
-            self.assertIn(about, error.reason)
+            self.assertIn(about, error.field)
             self.assertEqual(error.kind, "bad_input")
         error = self.error(graspmap.grasp, square(), [[9, 9, 9]])
         self.assertEqual((error.field, error.value), ("location 1", "9,9,9"))

@@ -23,7 +23,9 @@ testing::AssertionResult is_error(const libmap::Error& error, const ExpectedErro
   const auto differs = [](const std::string& part, const std::string& expected_part) {
     return !expected_part.empty() && part != expected_part;
   };
-  const char* part = differs(context.file, expected.file.string())              ? "file"
+  const bool other_file = differs(context.file, expected.file.string()) &&
+                          std::filesystem::path(context.file).filename() != expected.file;
+  const char* part = other_file                                                 ? "file"
                      : differs(context.field, expected.field)                   ? "field"
                      : differs(context.value, expected.value)                   ? "value"
                      : differs(context.bound, expected.bound)                   ? "bound"

@@ -12,7 +12,7 @@ namespace graspmap_test {
 
 // Expected parts of an error. Empty parts are not compared; the kind always is.
 struct ExpectedError {
-  std::filesystem::path file{};
+  std::filesystem::path file{};  // path or file name
   std::string field{};
   std::string value{};
   std::string bound{};

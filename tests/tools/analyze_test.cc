@@ -152,8 +152,7 @@ TEST(Analyze, BadInputIsSaidInOneLine) {
   write_terrain();
   EXPECT_TRUE(bad_input(graspmap({"analyze", "terrain.pcd", "-o", "out"}),
                         {.file = "terrain.pcd", .field = "score"}));
-  EXPECT_TRUE(bad_input(graspmap({"analyze", "none.pcd", "-o", "out"}),
-                        {.file = "none.pcd", .about = "no such"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "none.pcd", "-o", "out"}), {.file = "none.pcd"}));
   score("map.pcd");
   EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "--against", "terrain.pcd", "-o", "out"}),
                         {.file = "terrain.pcd", .field = "score"}));
@@ -166,11 +165,10 @@ TEST(Analyze, BadInputIsSaidInOneLine) {
                         {.field = "--start", .value = "1,2", .bound = "X,Y,Z"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "--against", "map.pcd", "-o", "out",
                                   "--transform", "50,0,0,0,0,0"}),
-                        {.file = "map.pcd", .about = "no voxel"}));
+                        {.file = "map.pcd"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "-o", "out", "--transform", "bogus"}),
                         {.field = "--transform", .value = "bogus"}));
-  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.tiles", "-o", "out"}),
-                        {.file = "map.tiles", .about = "convert"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.tiles", "-o", "out"}), {.file = "map.tiles"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("out")));
 }
 

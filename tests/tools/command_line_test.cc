@@ -157,8 +157,8 @@ TEST(CommandLine, DryRunWritesNothing) {
   EXPECT_TRUE(bad_input(score_quickly({"--dry-run", "--voxel-size", "10"}),
                         {.field = "voxel_size_m", .value = "10"}))
       << "it checks all the same";
-  EXPECT_TRUE(bad_input(graspmap({"score", "none.pcd", "-o", "m.csv", "--dry-run"}),
-                        {.file = "none.pcd", .about = "no such"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"score", "none.pcd", "-o", "m.csv", "--dry-run"}), {.file = "none.pcd"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 
@@ -206,8 +206,7 @@ TEST(CommandLine, AFileThatGrowsBeyondItsLimitIsAnError) {
   const auto names = graspmap_test::names_in_scratch();
   const ProgramResult result =
       in_shell("ulimit -f 8; ", "score terrain.pcd --curvature-radius 0 -o map.csv --quiet");
-  EXPECT_TRUE(ended_with(
-      result, {.file = "map.csv", .about = "File too large", .kind = libmap::ErrorKind::failed}));
+  EXPECT_TRUE(ended_with(result, {.file = "map.csv", .kind = libmap::ErrorKind::failed}));
   EXPECT_EQ(content("map.csv"), map);
   EXPECT_EQ(graspmap_test::names_in_scratch(), names);
 }
@@ -216,18 +215,15 @@ TEST(CommandLine, AFileOfAFolderThatGrowsBeyondItsLimitIsNamed) {
   const ProgramResult result =
       in_shell("ulimit -f 512; ",
                "simulate terrain --size 1.5 --tile-size 1.5 --spacing 0.008 -o pieces --quiet");
-  EXPECT_TRUE(ended_with(result, {.file = "pieces/piece_0_0.pcd",
-                                  .about = "File too large",
-                                  .kind = libmap::ErrorKind::failed}));
+  EXPECT_TRUE(
+      ended_with(result, {.file = "pieces/piece_0_0.pcd", .kind = libmap::ErrorKind::failed}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{});
 }
 
 TEST(CommandLine, AFolderThatCannotBeMadeIsAnError) {
   write_text(scratch("t.csv"), "graspable,score\n1,0.9\n0,0.2\n");
   const ProgramResult result = graspmap({"evaluate", "t.csv", "-o", "t.csv/inner/out"});
-  EXPECT_TRUE(ended_with(
-      result,
-      {.file = "t.csv/inner", .about = "Not a directory", .kind = libmap::ErrorKind::failed}));
+  EXPECT_TRUE(ended_with(result, {.file = "t.csv/inner", .kind = libmap::ErrorKind::failed}));
 }
 
 TEST(CommandLine, WhatStandsInAFileReachesTheTerminalAsPlainText) {
@@ -238,8 +234,7 @@ TEST(CommandLine, WhatStandsInAFileReachesTheTerminalAsPlainText) {
                          .value = "'\\x1b[2J\\xff\\x0d\xc3\xa9\\xc2\\x9b'"}));
   write_text(scratch("b.csv"), "x,y,z\n" + std::string(100'000, 'n') + ",0,0\n");
   const graspmap_test::ProgramResult result = graspmap({"lookup", "b.csv", "b.csv", "-o", "c.csv"});
-  EXPECT_TRUE(
-      bad_input(result, {.file = "b.csv", .field = "row 1, column 'x'", .about = "nnn ... nnn"}));
+  EXPECT_TRUE(bad_input(result, {.file = "b.csv", .field = "row 1, column 'x'"}));
   EXPECT_LT(result.standard_error.size(), 1100U);
 }
 
@@ -255,10 +250,9 @@ TEST(CommandLine, FaultsOfTheConfigurationNameItsFile) {
 
 TEST(CommandLine, PathsThatLeadNowhere) {
   std::filesystem::create_symlink("loop.pcd", scratch("loop.pcd"));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "loop.pcd", "-o", "a.ply"}),
-                        {.file = "loop.pcd", .about = "symbolic links"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "loop.pcd", "-o", "a.ply"}), {.file = "loop.pcd"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", std::string(300, 'n') + ".pcd", "-o", "a.ply"}),
-                        {.file = std::string(300, 'n') + ".pcd", .about = "too long"}));
+                        {.file = std::string(300, 'n') + ".pcd"}));
 }
 
 TEST(CommandLine, WhatCannotBePrintedIsAnError) {
@@ -270,9 +264,7 @@ TEST(CommandLine, WhatCannotBePrintedIsAnError) {
                                        {"--help", "graspmap"},
                                        {"--version", "graspmap"}}) {
     const ProgramResult result = in_shell("", std::string(words) + " > /dev/full");
-    EXPECT_TRUE(ended_with(
-        result,
-        {.file = "standard output", .about = "No space left", .kind = libmap::ErrorKind::failed}));
+    EXPECT_TRUE(ended_with(result, {.file = "standard output", .kind = libmap::ErrorKind::failed}));
     EXPECT_TRUE(result.standard_error.starts_with(std::string(program) + ": error: "));
   }
 }

@@ -271,7 +271,7 @@ TEST(Compare, IcpSaysWhatItCannotDo) {
       graspmap({"compare", "points.ply", "square.ply", "--icp", "--icp-max-iterations", "1"});
   EXPECT_TRUE(warned(short_run, {"ICP", "1 iterations"}));
   EXPECT_TRUE(bad_input(graspmap({"compare", "square.ply", "points.ply", "--icp"}),
-                        {.file = "points.ply", .about = "without normals"}));
+                        {.file = "points.ply"}));
 }
 
 TEST(Compare, ImageOfSignedDistances) {
@@ -304,7 +304,7 @@ TEST(Compare, ImageOfSignedDistances) {
   EXPECT_LT(red_column / static_cast<double>(red), blue_column / static_cast<double>(blue));
   EXPECT_NEAR(json_of("map.png.json").at("results").at("rmse_m"), 0.004, 1e-8);
   EXPECT_TRUE(bad_input(graspmap({"compare", "halves.ply", "square.ply", "--image", "map.jpg"}),
-                        {.file = "map.jpg", .about = ".png"}));
+                        {.file = "map.jpg"}));
 }
 
 TEST(Compare, ExtremesAreOneShortLine) {
@@ -356,12 +356,9 @@ TEST(Compare, TransformFilesThatAreNone) {
       bad_input(refused("1 0 0\n0 1 0\n0 0 1\n0 0 0\n"), {.file = "t.txt", .field = "line 1"}));
   EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 x 0\n0 0 0 1\n"),
                         {.file = "t.txt", .field = "line 3", .value = "x"}));
-  EXPECT_TRUE(bad_input(refused("2 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"),
-                        {.file = "t.txt", .about = "rotation"}));
-  EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n"),
-                        {.file = "t.txt", .about = "rotation"}));
-  EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 1 1\n"),
-                        {.file = "t.txt", .about = "rotation"}));
+  EXPECT_TRUE(bad_input(refused("2 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"), {.file = "t.txt"}));
+  EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n"), {.file = "t.txt"}));
+  EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 1 1\n"), {.file = "t.txt"}));
   EXPECT_TRUE(bad_input(refused(""), {.file = "t.txt", .field = "rows", .value = "0"}));
 }
 
@@ -384,13 +381,11 @@ TEST(Compare, BadInput) {
   EXPECT_TRUE(bad_input(run({"--box", "5,5,5,6,6,6"}), {.file = "points.ply", .field = "--box"}));
   EXPECT_TRUE(
       bad_input(run({"--within", "0"}), {.field = "--within", .value = "0", .bound = "> 0"}));
-  EXPECT_TRUE(
-      bad_input(run({"-o", "square.ply"}), {.file = "square.ply", .about = "is the input"}));
-  EXPECT_TRUE(bad_input(graspmap({"compare", "none.ply", "square.ply"}),
-                        {.file = "none.ply", .about = "no such"}));
+  EXPECT_TRUE(bad_input(run({"-o", "square.ply"}), {.file = "square.ply"}));
+  EXPECT_TRUE(bad_input(graspmap({"compare", "none.ply", "square.ply"}), {.file = "none.ply"}));
   libmap::write_cloud(scratch("empty.ply"), {});
   EXPECT_TRUE(bad_input(graspmap({"compare", "points.ply", "empty.ply"}),
-                        {.file = "empty.ply", .about = "no points"}));
+                        {.file = "empty.ply", .field = "points of the cloud"}));
 }
 
 }  // namespace compare_test

@@ -150,7 +150,7 @@ TEST(SpotCheckCommand, MeshBelowTheBoxHasNoHeight) {
   Words above = words;
   above.emplace_back("--box=-1.5,-1,-0.3,1.5,1,0.5");
   above.insert(above.begin(), {"compare", "--edges"});
-  EXPECT_TRUE(bad_input(graspmap(above), {.file = "mesh.ply", .about = "edges"}));
+  EXPECT_TRUE(bad_input(graspmap(above), {.file = "mesh.ply"}));
   Words around = words;
   around.emplace_back("--box=-1.5,-1,-1.3,1.5,1,0.5");
   EXPECT_EQ(checked(around).at("missing"), 0);
@@ -163,9 +163,8 @@ TEST(SpotCheckCommand, BadInput) {
     more.insert(more.begin(), {"compare", "--edges", "site.ply", "--quiet"});
     return graspmap(more);
   };
-  EXPECT_TRUE(bad_input(graspmap({"compare", "--edges", "none.ply"}),
-                        {.file = "none.ply", .about = "no such"}));
-  EXPECT_TRUE(bad_input(run({"-o", "check.txt"}), {.file = "check.txt", .about = ".csv"}));
+  EXPECT_TRUE(bad_input(graspmap({"compare", "--edges", "none.ply"}), {.file = "none.ply"}));
+  EXPECT_TRUE(bad_input(run({"-o", "check.txt"}), {.file = "check.txt"}));
   EXPECT_TRUE(
       bad_input(run({"--positions-per-edge", "0"}),
                 {.field = "--positions-per-edge", .value = "0", .bound = ">= 1 and <= 10000"}));
@@ -178,14 +177,13 @@ TEST(SpotCheckCommand, BadInput) {
   EXPECT_TRUE(bad_input(
       run({"--box", "0,0,0,0,0,0"}),
       {.file = "site.ply", .field = "width and depth", .value = "0 m, 0 m", .bound = "> 0"}));
-  EXPECT_TRUE(bad_input(run({"--box", "10,10,0,12,12,1"}), {.file = "site.ply", .about = "edges"}));
+  EXPECT_TRUE(bad_input(run({"--box", "10,10,0,12,12,1"}), {.file = "site.ply"}));
   EXPECT_TRUE(bad_input(run({"--truth", "mesh.ply", "--ground", "fit"}),
                         {.field = "--ground", .about = "--truth"}));
-  EXPECT_TRUE(
-      bad_input(run({"--truth", "site.ply"}), {.file = "site.ply", .about = "no triangle"}));
+  EXPECT_TRUE(bad_input(run({"--truth", "site.ply"}), {.file = "site.ply", .field = "triangles"}));
   libmap::write_cloud(scratch("empty.ply"), {});
   EXPECT_TRUE(bad_input(graspmap({"compare", "--edges", "empty.ply", "--ground", "zero"}),
-                        {.file = "empty.ply", .about = "no points"}));
+                        {.file = "empty.ply", .field = "points"}));
   ASSERT_TRUE(succeeded(run({"--ground", "zero", "-o", "check.csv", "--dry-run"})));
   EXPECT_EQ(graspmap_test::names_in_scratch(), (Words{"empty.ply", "mesh.ply", "site.ply"}));
 }

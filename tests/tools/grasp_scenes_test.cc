@@ -87,9 +87,9 @@ TEST(GraspScenes, BadInputIsOneLineAndWritesNothing) {
   make_site();
   std::filesystem::create_directory(scratch("mine"));
   graspmap_test::write_text(scratch("mine/a.txt"), "mine");
-  EXPECT_TRUE(bad_input(grasp({"--scenes", "mine"}), {.file = "mine", .about = "not empty"}));
+  EXPECT_TRUE(bad_input(grasp({"--scenes", "mine"}), {.file = "mine"}));
   graspmap_test::write_text(scratch("file"), "mine");
-  EXPECT_TRUE(bad_input(grasp({"--scenes", "file"}), {.file = "file", .about = "a folder"}));
+  EXPECT_TRUE(bad_input(grasp({"--scenes", "file"}), {.file = "file"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("scenes")));
 }
 

@@ -119,7 +119,7 @@ TEST(GraspCommand, FitsPullsAndPlansTheNext) {
     return bad_input(graspmap({"grasp", "ground.ply", "--fit", "bad.csv", "-o", "b.yaml"}),
                      expected);
   };
-  EXPECT_TRUE(refused("x,y,z,force_n\n", {.file = "bad.csv", .about = "no pull tests"}));
+  EXPECT_TRUE(refused("x,y,z,force_n\n", {.file = "bad.csv", .field = "pull tests"}));
   EXPECT_TRUE(
       refused("x,y,z,force_n\n0,0,9,3\n", {.file = "bad.csv", .field = "row 1", .value = "0,0,9"}));
   EXPECT_TRUE(refused(
@@ -143,7 +143,7 @@ TEST(GraspCommand, BadInputIsOneLine) {
         {.field = flag, .value = "0"}));
   const auto former = graspmap(with({"-o", "t.csv", "--asperity-min", "30"}));
   EXPECT_TRUE(wrong_usage(former, {"gripper.engagement.asperity_min_deg"}));
-  EXPECT_TRUE(refused({"-o", "t.txt"}, {.file = "t.txt", .about = ".csv"}));
+  EXPECT_TRUE(refused({"-o", "t.txt"}, {.file = "t.txt"}));
   EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.fingers.count=0"},
                       {.field = "fingers.count", .value = "0", .bound = ">= 1 and <= 64"}));
   EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.engagement.friction=-0.1"},
@@ -168,7 +168,7 @@ TEST(GraspCommand, BadInputIsOneLine) {
   write_text(scratch("nan.csv"), "x,y,z\n0,nan,0.05\n");
   EXPECT_TRUE(bad_input(on("ground.ply", "nan.csv"), {.file = "nan.csv", .field = "row 1"}));
   write_text(scratch("none.csv"), "x,y,z\n");
-  EXPECT_TRUE(bad_input(on("ground.ply", "none.csv"), {.file = "none.csv", .about = "no rows"}));
+  EXPECT_TRUE(bad_input(on("ground.ply", "none.csv"), {.file = "none.csv"}));
   write_text(scratch("taken.csv"), "x,y,z,graspable\n0,0,0.05,1\n");
   EXPECT_TRUE(
       bad_input(on("ground.ply", "taken.csv"), {.file = "taken.csv", .field = "graspable"}));
@@ -176,7 +176,7 @@ TEST(GraspCommand, BadInputIsOneLine) {
              "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
              "property float z\nend_header\n0 0 0\n");
   EXPECT_TRUE(
-      bad_input(on("points.ply", "places.csv"), {.file = "points.ply", .about = "no triangle"}));
+      bad_input(on("points.ply", "places.csv"), {.file = "points.ply", .field = "triangles"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("t.csv")));
 }
 
@@ -518,8 +518,7 @@ TEST(GraspCommand, BadMaps) {
                         {.field = "--tile", .value = "3/2"}));
   EXPECT_TRUE(bad_input(graspmap(with({"-o", "t.csv", "--tile", "1/2"})),
                         {.field = "--tile", .about = "--map"}));
-  EXPECT_TRUE(
-      bad_input(graspmap(map_words("map.pcd")), {.file = "map.pcd", .about = "is the input"}));
+  EXPECT_TRUE(bad_input(graspmap(map_words("map.pcd")), {.file = "map.pcd"}));
   auto map = libmap::read_cloud(scratch("map.pcd")).cloud;
   map.add_field("grasp_trials", libmap::ScalarType::float32);
   libmap::write_cloud(scratch("taken.pcd"), map);
@@ -530,10 +529,10 @@ TEST(GraspCommand, BadMaps) {
   map.fields.pop_back();
   libmap::write_cloud(scratch("far.pcd"), map);
   words[3] = "far.pcd";
-  EXPECT_TRUE(bad_input(graspmap(words), {.file = "far.pcd", .about = "mesh"}));
+  EXPECT_TRUE(bad_input(graspmap(words), {.file = "far.pcd"}));
   libmap::write_cloud(scratch("none.pcd"), {});
   words[3] = "none.pcd";
-  EXPECT_TRUE(bad_input(graspmap(words), {.file = "none.pcd", .about = "no points"}));
+  EXPECT_TRUE(bad_input(graspmap(words), {.file = "none.pcd", .field = "points of the map"}));
   map.fields.clear();
   libmap::write_cloud(scratch("bare.pcd"), map);
   words[3] = "bare.pcd";

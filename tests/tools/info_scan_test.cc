@@ -137,13 +137,12 @@ TEST(InfoScan, WhatIsNoScan) {
   write_text(scratch("empty.db"), "");
   EXPECT_TRUE(bad_input(graspmap({"info", "empty.db"}), {.file = "empty.db", .about = "empty: 0"}));
   write_text(scratch("text.db"), "hello");
-  EXPECT_TRUE(bad_input(graspmap({"info", "text.db"}), {.file = "text.db", .about = "a scan"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "text.db"}), {.file = "text.db"}));
   execute(scratch("other.db"), "CREATE TABLE T (id INTEGER)");
-  EXPECT_TRUE(bad_input(graspmap({"info", "other.db"}), {.file = "other.db", .about = "no table"}));
-  EXPECT_TRUE(bad_input(graspmap({"info", "none.db"}), {.file = "none.db", .about = "no such"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "other.db"}), {.file = "other.db"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "none.db"}), {.file = "none.db"}));
   std::filesystem::create_directory(scratch("folder"));
-  EXPECT_TRUE(
-      bad_input(graspmap({"info", "folder"}), {.file = "folder", .about = "associations.txt"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "folder"}), {.file = "folder"}));
   write_terrain();
   EXPECT_TRUE(bad_input(graspmap({"info", "terrain.pcd", "--verify"}),
                         {.file = "terrain.pcd", .field = "--verify"}));

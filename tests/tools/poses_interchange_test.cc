@@ -164,8 +164,7 @@ TEST(ExtractColmap, BesideOthersAndInADryRun) {
   EXPECT_FALSE(json_of("model.json")["results"].contains("kept_images"));
   EXPECT_FALSE(json_of("mesh.json")["results"].contains("points"));
   write_text(scratch("model/notes.txt"), "mine");
-  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--colmap", "model"}),
-                        {.file = "model", .about = ".txt"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--colmap", "model"}), {.file = "model"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--colmap", "x", "--point-spacing", "0"}),
                         {.field = "--point-spacing", .value = "0", .bound = ">= 1 and <= 10000"}));
 }
@@ -255,7 +254,7 @@ TEST(ConvertPoses, RtabmapsFormatsThereAndBack) {
   libmap::write_colmap_model(scratch("model"), {.cameras = {{1, {"PINHOLE", 6, 4, {1, 1, 1, 1}}}},
                                                 .images = {{1, {1, "3.jpg"}}}});
   EXPECT_TRUE(bad_input(graspmap({"convert", "model/images.txt", "-o", "b.tum"}),
-                        {.file = "model/images.txt", .about = "cameras"}));
+                        {.file = "model/images.txt"}));
 }
 
 // Each is one line on stderr that names the file and, where there is one, the line.
@@ -292,9 +291,9 @@ TEST(PosesOfFiles, OddOnesAreNamed) {
        "VERTEX3 1 0 0 0 0 0\n",
        {.field = "line 1", .value = "7 columns long", .bound = ">= 8"}},
       {"l.txt", "1 2 3\n", {.field = "line 1", .value = "3 columns long"}},
-      {"m.txt", "\n\n", {.about = "no pose"}},
+      {"m.txt", "\n\n", {.field = "poses"}},
       {"n.tum", "12345678901234567890123" + pose + "\n", {.about = "within 20 ms"}},
-      {"o.tum", "1" + pose + " 99\n", {.about = "none of the poses"}},
+      {"o.tum", "1" + pose + " 99\n", {.field = "poses"}},
   };
   for (const Case& one : cases) {
     SCOPED_TRACE(one.name);
@@ -306,7 +305,7 @@ TEST(PosesOfFiles, OddOnesAreNamed) {
   }
   fs::create_directory(scratch("empty"));
   EXPECT_TRUE(bad_input(graspmap({"fuse", scan, "--poses", "empty", "-o", "cloud.ply"}),
-                        {.file = "empty", .about = ".txt"}));
+                        {.file = "empty"}));
   fs::create_directory(scratch("model"));
   write_text(scratch("model/images.txt"), "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0\n");
   EXPECT_TRUE(

@@ -314,7 +314,7 @@ TEST(RefineCalibration, IsWrittenAndApplied) {
             graspmap_test::read_text(scratch("same.ply")));
   EXPECT_TRUE(
       bad_input(graspmap({"fuse", "scan.db", "--calibration", "camera.yaml2", "-o", "c.ply"}),
-                {.file = "camera.yaml2", .about = "no such"}));
+                {.file = "camera.yaml2"}));
   camera.width = 321;
   libmap::write_text(scratch("other.yaml"), libmap::to_yaml({.camera = camera}));
   EXPECT_TRUE(bad_input(
@@ -394,8 +394,7 @@ TEST(RefineScans, OverlappingOnesAreJoinedAndOthersAreReported) {
   EXPECT_TRUE(
       bad_input(graspmap({"refine", "a.db", "b.db", "-o", "p.tum", "--write-database", "o.db"}),
                 {.field = "--write-database", .value = "o.db"}));
-  EXPECT_TRUE(bad_input(graspmap({"refine", "a.db", "a.db", "-o", "p.tum"}),
-                        {.file = "a.db", .about = "twice"}));
+  EXPECT_TRUE(bad_input(graspmap({"refine", "a.db", "a.db", "-o", "p.tum"}), {.file = "a.db"}));
 }
 
 TEST(RefineScans, BoardsThatAreNotThereAreBadInput) {
@@ -444,8 +443,7 @@ TEST(Refine, BadInputIsOneLine) {
                          .bound = "one of .tum .kitti .g2o .toro .colmap"}));
   EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "p.tum", "--links", "links.tum"}),
                         {.field = "--links", .value = "links.tum"}));
-  EXPECT_TRUE(bad_input(graspmap({"refine", "none.db", "-o", "p.tum"}),
-                        {.file = "none.db", .about = "no such"}));
+  EXPECT_TRUE(bad_input(graspmap({"refine", "none.db", "-o", "p.tum"}), {.file = "none.db"}));
   EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "p.tum", "--gauge-node", "999"}),
                         {.field = "gauge_node", .value = "999"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("p.tum")));

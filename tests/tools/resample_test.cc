@@ -150,21 +150,19 @@ TEST(Resample, BadInput) {
                         {.field = "--count", .value = "2000000000", .bound = ">= 0 and <= 1e+08"}));
   EXPECT_TRUE(bad_input(run({"--count", "100", "--radius", "0.1"}),
                         {.field = "--count", .value = "100", .about = "--radius"}));
-  EXPECT_TRUE(bad_input(graspmap({"resample", "none.ply", "-o", "a.pcd"}),
-                        {.file = "none.ply", .about = "no such"}));
+  EXPECT_TRUE(bad_input(graspmap({"resample", "none.ply", "-o", "a.pcd"}), {.file = "none.ply"}));
   EXPECT_TRUE(bad_input(graspmap({"resample", "ridge.ply", "-o", "a.obj"}),
                         {.file = "a.obj",
                          .field = "extension",
                          .value = ".obj",
                          .bound = ".pcd, .ply, .csv or .vtp"}));
-  EXPECT_TRUE(bad_input(graspmap({"resample", "ridge.ply", "-o", "ridge.ply"}),
-                        {.file = "ridge.ply", .about = "is the input"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"resample", "ridge.ply", "-o", "ridge.ply"}), {.file = "ridge.ply"}));
   libmap::TriangleMesh line;
   line.vertices = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
   line.triangles = {{0, 1, 2}};
   libmap::write_mesh(scratch("line.ply"), line);
-  EXPECT_TRUE(bad_input(graspmap({"resample", "line.ply", "-o", "a.pcd"}),
-                        {.file = "line.ply", .about = "no area"}));
+  EXPECT_TRUE(bad_input(graspmap({"resample", "line.ply", "-o", "a.pcd"}), {.file = "line.ply"}));
   EXPECT_EQ(names_in_scratch(), (Words{"line.ply", "ridge.ply"}));
 }
 

@@ -76,7 +76,7 @@ TEST(SimulateSite, BadInputIsOneLine) {
   EXPECT_TRUE(bad_input(site({"--site", "rock", "-o", "out"}), {.field = "site", .value = "rock"}));
   EXPECT_TRUE(bad_input(site({"--site", "bare.yaml", "-o", "out"}),
                         {.file = "bare.yaml", .field = "rocks"}));
-  EXPECT_TRUE(bad_input(site({"-o", "site.ply"}), {.file = "site.ply", .about = "folder"}));
+  EXPECT_TRUE(bad_input(site({"-o", "site.ply"}), {.file = "site.ply"}));
   EXPECT_TRUE(bad_input(site({"--edge-length", "0.0001", "-o", "out"}),
                         {.field = "edge_length_m", .value = "1e-04"}));
   EXPECT_TRUE(bad_input(site({"--edge-length", "0", "-o", "out"}),

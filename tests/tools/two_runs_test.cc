@@ -79,8 +79,7 @@ void expect_one_of_two(const Words& words, const std::string& output) {
   }
   const ProgramResult second = graspmap(words);
   kill(first->process(), SIGCONT);
-  EXPECT_TRUE(ended_with(
-      second, {.file = output, .about = "another process", .kind = libmap::ErrorKind::failed}));
+  EXPECT_TRUE(ended_with(second, {.file = output, .kind = libmap::ErrorKind::failed}));
   EXPECT_EQ(std::count(second.standard_error.begin(), second.standard_error.end(), '\n'), 1);
   EXPECT_TRUE(succeeded(first->wait()));
   EXPECT_TRUE(fs::exists(scratch(output)));
@@ -115,8 +114,7 @@ TEST(TwoRuns, IntoAStoreOfTiles) {
   const Words share = {"score", "t.pcd", "-o", "m.tiles", "--tile", "1/2", "--quiet"};
   ASSERT_TRUE(succeeded(graspmap(share)));
   const auto refused = [](const ProgramResult& result) {
-    return ended_with(
-        result, {.file = "m.tiles", .about = "another process", .kind = libmap::ErrorKind::failed});
+    return ended_with(result, {.file = "m.tiles", .kind = libmap::ErrorKind::failed});
   };
   const std::string plan = content("m.tiles/progress/plan.json");
   {
@@ -154,7 +152,7 @@ TEST(TwoRuns, AFolderOfWhatAKilledRunLeftIsNobodys) {
   fs::create_directory(scratch("o"));
   graspmap_test::write_text(scratch("o/.partial"), "mine");
   graspmap_test::write_text(scratch("o/mine"), "mine");
-  EXPECT_TRUE(graspmap_test::bad_input(graspmap(words), {.file = "o", .about = "not empty"}));
+  EXPECT_TRUE(graspmap_test::bad_input(graspmap(words), {.file = "o"}));
 }
 
 }  // namespace two_runs_test

@@ -210,11 +210,11 @@ TEST(WorldCommand, BadInputWritesNothing) {
     return graspmap(words);
   };
   EXPECT_TRUE(bad_input(convert({"empty.ply", "-o", "x.world"}),
-                        {.file = "empty.ply", .about = "triangle"}));
+                        {.file = "empty.ply", .field = "triangles"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--map", "other.ply"}),
                         {.file = "other.ply", .field = "points on the surface", .value = "0"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--rig", "none.yaml"}),
-                        {.file = "none.yaml", .about = "camera"}));
+                        {.file = "none.yaml"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--rig", "name.yaml"}),
                         {.file = "name.yaml", .field = "name of a camera", .value = "a::b"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "a::b.world"}),

@@ -204,7 +204,7 @@ TEST(ExpectedMap, ContradictionsAreErrors) {
 TEST(ExpectedMap, NoMap) {
   const ExpectedMap expected = parse("a,0,0,0,,,,0.1,1,\n");
   EXPECT_TRUE(is_error(error_of([&] { evaluate_expected_map({}, expected, 0.8); }),
-                       {.about = "no points"}));
+                       {.field = "points of the map"}));
   libmap::PointCloud cloud;
   cloud.positions.emplace_back(0, 0, 0);
   EXPECT_TRUE(

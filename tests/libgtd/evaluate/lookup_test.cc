@@ -145,7 +145,10 @@ TEST(Lookup, FromVeryFarTheFirstOfTheNearest) {
 
 TEST(Lookup, BadInputIsAnError) {
   PointCloud map;
-  EXPECT_TRUE(is_error(error_of([&] { libgtd::look_up(map, {{0, 0, 0}}); }), {.about = "map"}));
+  EXPECT_TRUE(is_error(error_of([&] {
+                         libgtd::look_up(map, {{0, 0, 0}});
+                       }),
+                       {.field = "points of the map"}));
   map.positions = {{0, 0, 0}};
   LookupOptions options;
   options.max_distance_m = -1.0;

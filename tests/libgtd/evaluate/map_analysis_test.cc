@@ -107,7 +107,8 @@ TEST(VoxelMap, HostileMapsAreSaid) {
   // Points without a position are left out; points without a score are not graspable.
   cloud = graded_floor();
   for (Eigen::Vector3d& position : cloud.positions) position.z() = std::nan("");
-  EXPECT_TRUE(is_error(error_of([&] { libgtd::voxel_map_of(cloud); }), {.about = "no points"}));
+  EXPECT_TRUE(
+      is_error(error_of([&] { libgtd::voxel_map_of(cloud); }), {.field = "points of the map"}));
   cloud = graded_floor();
   cloud.find_field("score")->values[1990] = std::nan("");
   cloud.positions[1991].x() = std::nan("");

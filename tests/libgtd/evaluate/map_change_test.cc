@@ -196,7 +196,7 @@ TEST(MapChange, MapsApartAndOptionsOutOfBounds) {
   const VoxelMap map = random_map(0);
   const libmap::Pose far(Eigen::Translation3d(100.0, 0.0, 0.0));
   EXPECT_TRUE(is_error(error_of([&] { libgtd::compare_maps(map, level_surface(map), map, far); }),
-                       {.about = "no voxel"}));
+                       {.field = "voxels"}));
   EXPECT_EQ(error_of([&] {
               libgtd::compare_maps(map, level_surface(map), map, same,
                                    {.match_distance_voxels = 0.0});

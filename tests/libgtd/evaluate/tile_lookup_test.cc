@@ -208,7 +208,7 @@ TEST(TileLookupErrors, MapsThatCannotBeAsked) {
   empty.tiles.clear();
   const auto load = [&](std::size_t tile) { return map.load(tile); };
   EXPECT_TRUE(is_error(error_of([&] { libgtd::look_up_tiles(empty, load, points); }),
-                       {.about = "no points"}));
+                       {.field = "points of the map"}));
   const auto without_columns = [&](std::size_t tile) {
     PointCloud cloud = map.load(tile);
     cloud.fields.resize(2);
@@ -225,7 +225,7 @@ TEST(TileLookupErrors, MapsThatCannotBeAsked) {
     return libmap::select_points(cloud, order);
   };
   EXPECT_TRUE(is_error(error_of([&] { libgtd::look_up_tiles(map.index(), reversed, points); }),
-                       {.about = "order"}));
+                       {.field = "points of a tile"}));
   const auto nowhere = [&](std::size_t tile) {
     PointCloud cloud = map.load(tile);
     for (libmap::ScalarField& field : cloud.fields)

@@ -242,10 +242,11 @@ TEST(GroundPatch, DistancesAgreeWithAllTriangles) {
 
 TEST(GroundPatch, BadMeshes) {
   EXPECT_TRUE(is_error(error_of([] { libgtd::Ground ground{libmap::TriangleMesh{}}; }),
-                       {.about = "no triangles"}));
+                       {.field = "triangles of the mesh"}));
   auto mesh = height_mesh(0.1, 2, flat);
   mesh.vertices[3].z() = std::nan("");
-  EXPECT_TRUE(is_error(error_of([&] { libgtd::Ground ground(mesh); }), {.about = "finite"}));
+  EXPECT_TRUE(
+      is_error(error_of([&] { libgtd::Ground ground(mesh); }), {.field = "vertices of the mesh"}));
   mesh = height_mesh(0.1, 2, flat);
   mesh.triangles[0][1] = 1000;
   EXPECT_TRUE(is_error(error_of([&] { libgtd::Ground ground(mesh); }),

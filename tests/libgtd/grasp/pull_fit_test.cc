@@ -135,7 +135,7 @@ TEST(PullFit, BadTablesAreNamed) {
         .context()
         .field;
   };
-  EXPECT_EQ(field_of("x,y,z,force_n\n"), "");
+  EXPECT_EQ(field_of("x,y,z,force_n\n"), "pull tests");
   EXPECT_EQ(field_of("x,y,z,force_n\n0,0,0,-1\n"), "row 1, force_n");
   EXPECT_EQ(field_of("x,y,z,held\n0,0,0,1\n"), "row 1, load_n");
   EXPECT_EQ(field_of("x,y,z,load_n,held\n0,0,0,5,\n"), "row 1, force_n");

@@ -197,7 +197,7 @@ TEST(SurfaceError, UnsureGroundIsUnseen) {
   EXPECT_TRUE(is_error(error_of([&] {
                          Ground(mesh, {{0.1}, {}});
                        }),
-                       {.about = "number of errors"}));
+                       {.field = "errors of the mesh"}));
 }
 
 }  // namespace surface_error_test

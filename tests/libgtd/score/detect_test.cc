@@ -67,7 +67,8 @@ TEST_P(Detection, MapReturnsIntoTheInputFrame) {
 TEST(DetectionErrors, NameTheField) {
   const PointCloud cloud = bumpy_cloud(0.4, 0.01);
   DetectionOptions options = options_for(Method::corrected);
-  EXPECT_TRUE(is_error(error_of([&] { detect(PointCloud(), options); }), {.about = "cloud"}));
+  EXPECT_TRUE(
+      is_error(error_of([&] { detect(PointCloud(), options); }), {.field = "points of the cloud"}));
   options.scenario.voxel_size_m = 10.0;
   EXPECT_EQ(error_of([&] { detect(cloud, options); }).context().field, "voxel_size_m");
   options.scenario.voxel_size_m = 0.0;
@@ -124,7 +125,7 @@ TEST(DetectionErrors, PointsInOnePlaceOrOnALineAreNoTerrain) {
     EXPECT_TRUE(
         is_error(error_of([&] { detect(cloud, options); }), {.field = "points", .value = "1"}));
     for (int n = 0; n < 50; ++n) cloud.positions.emplace_back(0.3 + 0.01 * n, 0.2, 0.1);
-    EXPECT_TRUE(is_error(error_of([&] { detect(cloud, options); }), {.about = "on a line"}));
+    EXPECT_TRUE(is_error(error_of([&] { detect(cloud, options); }), {.field = "points"}));
   }
 }
 

@@ -243,7 +243,7 @@ TEST(Footholds, ErrorsNameTheField) {
   EXPECT_EQ(error_of([&] { libgtd::find_footholds(map); }).context().field, "border");
   EXPECT_NO_THROW(libgtd::find_footholds(map, {.border = true}));
   EXPECT_TRUE(graspmap_test::is_error(error_of([&] { libgtd::find_footholds(PointCloud{}); }),
-                                      {.about = "no points"}));
+                                      {.field = "points of the map"}));
 }
 
 }  // namespace footholds_test

@@ -68,13 +68,13 @@ TEST(Merge, RefusesPartsOfWhichOnlySomeHaveColorsOrNormals) {
   EXPECT_TRUE(is_error(error_of([&] {
                          merge_map_clouds({libmap::select_points(cloud, {0}), other});
                        }),
-                       {.about = "colors"}));
+                       {.field = "colors"}));
   other = libmap::select_points(cloud, {1, 2});
   other.normals.assign(2, Eigen::Vector3f::UnitZ());
   EXPECT_TRUE(is_error(error_of([&] {
                          merge_map_clouds({libmap::select_points(cloud, {0}), other});
                        }),
-                       {.about = "normals"}));
+                       {.field = "normals"}));
 }
 
 // Values that have no order or do not fit an integer.

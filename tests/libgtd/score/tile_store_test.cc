@@ -94,11 +94,10 @@ TEST(MapTileStore, PlanAndIndexComeBackToTheBit) {
   EXPECT_EQ(read.terrain[0].box.max, plan.terrain[0].box.max);
 
   libmap::TileJournal one(store, {1, 2});
-  EXPECT_TRUE(
-      is_error(error_of([&] {
-                 libmap::TileJournal(store, {1, 2});
-               }),
-               {.file = store, .about = "another process", .kind = libmap::ErrorKind::failed}));
+  EXPECT_TRUE(is_error(error_of([&] {
+                         libmap::TileJournal(store, {1, 2});
+                       }),
+                       {.file = store, .kind = libmap::ErrorKind::failed}));
   libmap::TileJournal other(store, {2, 2});
   libgtd::add_tiles({tile(0, 1, 5), tile(-1, 1, 0)}, "key", one);
   libgtd::add_tiles({tile(-1, 0, 3)}, "key", other);
@@ -139,7 +138,7 @@ TEST(TileStore, AFileIsNone) {
   const fs::path store = scratch_folder() / "m.tiles";
   write_text(store, "");
   const libmap::Error error = error_of([&] { libgtd::read_tile_store(store); });
-  EXPECT_TRUE(is_error(error, {.about = "a file,"}));
+  EXPECT_TRUE(is_error(error, {.file = "m.tiles"}));
   EXPECT_EQ(error.context().file, store.string());
 }
 
@@ -217,7 +216,7 @@ TEST(TileStore, HostileIndex) {
   expect_error("\"tile_voxels\": 10", "\"tile_voxels\": 0", {.field = "tile_voxels", .value = "0"});
   expect_error("\"voxel_size_m\": 0.01", "\"voxel_size_m\": -1",
                {.field = "voxel_size_m", .value = "-1"});
-  expect_error("\"key\"", "\"kee\"", {.about = "key"});
+  expect_error("\"key\"", "\"kee\"", {.file = "index.json"});
   expect_error("tiles/-1_0.pcd", "../../../etc/passwd",
                {.field = "file of tile -1, 0", .value = "../../../etc/passwd"});
   expect_error("\"i\": -1", "\"i\": 3000000000", {.field = "i", .value = "3000000000"});
@@ -241,7 +240,7 @@ TEST(TileStore, HostileIndex) {
   for (std::size_t size = 0; size < text.size() - 2; size += 37) {
     write_text(store / "index.json", text.substr(0, size));
     EXPECT_TRUE(is_error(error_of([&] { libgtd::read_tile_store(store); }),
-                         {.file = store / "index.json", .about = "index"}));
+                         {.file = store / "index.json"}));
   }
   good.tiles = {tile(-1, 0, 3), tile(0, 0, 0)};
   write_index_again();

@@ -341,9 +341,9 @@ TEST(InterpolationErrors, TooFewOrOnALine) {
                        {.field = "points", .value = "2", .bound = ">= 3"}));
   cloud.positions = {{0, 0, 0}, {1, 1, 5}, {2, 2, 3}, {2, 2, 4}};
   for (const auto m : {InterpolationMethod::thesis, InterpolationMethod::corrected})
-    EXPECT_TRUE(is_error(error_of([&] { interpolate(cloud, method(m)); }), {.about = "line"}));
+    EXPECT_TRUE(is_error(error_of([&] { interpolate(cloud, method(m)); }), {.field = "points"}));
   cloud.positions.assign(10, Vector3d(1, 2, 3));
-  EXPECT_TRUE(is_error(error_of([&] { interpolate(cloud); }), {.about = "line"}));
+  EXPECT_TRUE(is_error(error_of([&] { interpolate(cloud); }), {.field = "points"}));
 }
 
 TEST(InterpolationErrors, OptionsOutOfRange) {

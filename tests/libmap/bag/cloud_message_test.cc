@@ -108,8 +108,8 @@ TEST(CloudMessage, WhatDoesNotFitIsSaid) {
       {.field = "point_step for field intensity", .value = "40", .bound = ">= 17179869212"}));
   EXPECT_TRUE(is_error(said([](auto& m) { m.fields[5].datatype = 9; }),
                        {.field = "datatype of field intensity", .value = "9", .bound = "1 to 8"}));
-  EXPECT_TRUE(
-      is_error(said([](auto& m) { m.fields[0].name = rm::to_ros("ex"); }), {.about = "found ex"}));
+  EXPECT_TRUE(is_error(said([](auto& m) { m.fields[0].name = rm::to_ros("ex"); }),
+                       {.field = "fields x, y and z"}));
   EXPECT_TRUE(
       is_error(said([](auto& m) { m.fields[5].name = rm::to_ros("x"); }), {.field = "field 'x'"}));
   EXPECT_TRUE(is_error(said([](auto& m) {

@@ -119,7 +119,7 @@ TEST(Cdr, CutOffAndLyingMessages) {
   for (std::size_t length = 0; length < whole.size(); ++length)
     EXPECT_TRUE(is_error(
         error_of([&] { rm::decode<rm::TFMessage>(MessageEncoding::cdr, whole.substr(0, length)); }),
-        {.about = "declares more"}))
+        {.field = "message"}))
         << length;
   for (const std::size_t at : {4U, 16U})
     for (const char byte : {'\xff', '\x7f'}) {
@@ -127,13 +127,13 @@ TEST(Cdr, CutOffAndLyingMessages) {
       lying.replace(at, 4, std::string(4, byte));
       EXPECT_TRUE(
           is_error(error_of([&] { rm::decode<rm::TFMessage>(MessageEncoding::cdr, lying); }),
-                   {.about = "declares more"}))
+                   {.field = "message"}))
           << at;
     }
   // Messages of another encapsulation (parameter lists), and of no encoding.
   EXPECT_TRUE(is_error(
       error_of([&] { rm::decode<rm::TFMessage>(MessageEncoding::cdr, "\x7f\x7f\x7f\x7f"); }),
-      {.about = "declares more"}));
+      {.field = "message"}));
   EXPECT_TRUE(is_error(error_of([&] { rm::decode<rm::TFMessage>(MessageEncoding::other, whole); }),
                        {.field = "encoding of the messages"}));
 }
@@ -343,7 +343,7 @@ TEST(Ros2Bag, MetadataOfAllVersions) {
   EXPECT_THAT(said(metadata("5", "[a]", "\"\"")).context().field, HasSubstr("relative_file_paths"));
   fs::remove(file);
   EXPECT_TRUE(
-      is_error(error_of([&] { libmap::list_bag(scratch_folder()); }), {.about = "reindex"}));
+      is_error(error_of([&] { libmap::list_bag(scratch_folder()); }), {.file = "metadata.yaml"}));
 }
 
 TEST(Ros2Bag, SplitRecordingsAreOneBag) {

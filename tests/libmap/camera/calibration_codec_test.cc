@@ -243,8 +243,7 @@ TEST(CalibrationCodec, RecordOfACameraReadsBack) {
 TEST(CalibrationCodec, TruncationsAndLyingCounts) {
   const std::string whole = record({.k = k, .d = {0.1, 0.2, 0, 0, 0.3}, .r = eye, .p = p});
   for (std::size_t size = 0; size < whole.size(); ++size)
-    EXPECT_TRUE(is_error(error_of([&] { libmap::decode_calibration(whole.substr(0, size)); }),
-                         {.about = "calibration"}))
+    EXPECT_TRUE(is_error(error_of([&] { libmap::decode_calibration(whole.substr(0, size)); }), {}))
         << size;
   for (const std::size_t place : {6U, 7U, 8U, 9U, 10U})
     for (const std::int32_t count : {-1, 1, 0x7fffffff}) {
@@ -252,15 +251,14 @@ TEST(CalibrationCodec, TruncationsAndLyingCounts) {
       std::memcpy(lying.data() + 4 * place, &count, 4);
       const std::string field =
           error_of([&] { libmap::decode_calibration(lying); }).context().field;
-      EXPECT_TRUE(field.empty() || field.starts_with("number of elements of")) << field;
+      EXPECT_TRUE(field == "records" || field.starts_with("number of elements of")) << field;
     }
   const std::string stereo = stereo_record({.k = k}, {.k = k}, eye, {-0.1, 0, 0});
   for (std::size_t size = 0; size < stereo.size(); ++size)
-    EXPECT_TRUE(is_error(error_of([&] { libmap::decode_calibration(stereo.substr(0, size)); }),
-                         {.about = "calibration"}))
+    EXPECT_TRUE(is_error(error_of([&] { libmap::decode_calibration(stereo.substr(0, size)); }), {}))
         << size;
   EXPECT_TRUE(is_error(error_of([] { libmap::decode_calibration(std::string(100, '\1')); }),
-                       {.about = "layout"}));
+                       {.field = "layout", .value = "100 bytes"}));
 }
 
 TEST(CalibrationCodec, RecordsThatDoNotBelongTogether) {
@@ -274,7 +272,7 @@ TEST(CalibrationCodec, RecordsThatDoNotBelongTogether) {
   EXPECT_TRUE(is_error(refusal_of(40 + 72 + 24 + 12, 1), {.value = "1", .bound = "0"}));
   EXPECT_TRUE(is_error(refusal_of(32, 163), {.value = "163"}));
   EXPECT_TRUE(is_error(error_of([&] { libmap::decode_calibration(stereo + record({.k = k})); }),
-                       {.about = "single"}));
+                       {.field = "cameras"}));
 }
 
 TEST(CalibrationCodec, StereoCamerasAtOnePlace) {
@@ -291,7 +289,7 @@ TEST(CalibrationCodec, NumbersThatAreNoCamera) {
   zero[0] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(error_of([&] { only_camera(record({.k = zero})); }).context().field, "fx");
   EXPECT_EQ(error_of([&] { only_camera(record({.k = k}, -3, 240)); }).context().field, "width");
-  EXPECT_TRUE(is_error(error_of([] { only_camera(record({})); }), {.about = "neither K nor P"}));
+  EXPECT_TRUE(is_error(error_of([] { only_camera(record({})); }), {.field = "K and P"}));
 }
 
 }  // namespace calibration_codec_test

@@ -268,12 +268,12 @@ TEST(CameraCalibration, ImagesThatTellNothingAreRefused) {
   }
   for (const LensModel lens : {LensModel::none, LensModel::equidistant})
     for (const double noise : {0.0, 0.1})
-      EXPECT_TRUE(is_error(refused(straight, noise, lens), {.about = "not determine"}));
+      EXPECT_TRUE(is_error(refused(straight, noise, lens), {.field = "images"}));
   // One image several times; one pose with noise.
   EXPECT_TRUE(is_error(refused(std::vector<Pose>(8, poses[0]), 0.0, LensModel::plumb_bob),
                        {.field = "number of images", .value = "1"}));
   EXPECT_TRUE(is_error(refused(std::vector<Pose>(8, straight[0]), 2.0, LensModel::none),
-                       {.about = "not determine"}));
+                       {.field = "images"}));
 }
 
 TEST(CameraCalibration, RepeatedImagesCountOnce) {

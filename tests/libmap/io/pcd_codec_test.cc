@@ -125,7 +125,7 @@ TEST(PcdFiles, HeadersThatLie) {
   for (const char* const points : {"9223372036854775807", "4611686018427387904", "1000000000000"})
     for (const char* const data : {"binary", "ascii", "binary_compressed"})
       EXPECT_TRUE(is_error(error_as(".pcd", pcd_header(points, data) + std::string(100, '\0')),
-                           {.about = "declares"}))
+                           {.file = "given.pcd"}))
           << points;
   for (const char* const points : {"-1", "1e3", "99999999999999999999", "x", ""})
     error_as(".pcd", pcd_header(points, "binary") + ten);
@@ -135,7 +135,7 @@ TEST(PcdFiles, HeadersThatLie) {
   EXPECT_EQ(read_as(".pcd", "# " + std::string(1000, 'x') + "\n" + whole).cloud.size(), 10U);
   EXPECT_TRUE(
       is_error(error_as(".pcd", "# " + std::string(std::size_t{1} << 20U, 'x') + "\n" + whole),
-               {.about = "no DATA"}));
+               {.field = "DATA line of the PCD header"}));
 }
 
 TEST(PcdFiles, CompressedSizesThatLie) {
@@ -145,13 +145,13 @@ TEST(PcdFiles, CompressedSizesThatLie) {
   };
   EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(1000, 120) + "abc"), {.about = "of 1000"}));
   EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(3, 119) + "abc"), {.about = "contain 119"}));
-  EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(0, 120)), {.about = "too few for"}));
-  EXPECT_TRUE(
-      is_error(error_as(".pcd", header + sizes(3, 120) + "\xff\xff\xff"), {.about = "broken"}));
-  EXPECT_TRUE(is_error(error_as(".pcd", header + "abc"), {.about = "size is missing"}));
+  EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(0, 120)), {.field = "compressed data"}));
+  EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(3, 120) + "\xff\xff\xff"),
+                       {.field = "compressed data"}));
+  EXPECT_TRUE(is_error(error_as(".pcd", header + "abc"), {.field = "compressed size"}));
   EXPECT_TRUE(is_error(error_as(".pcd", pcd_header("300000000", "binary_compressed") +
                                             sizes(3, 3600000000U) + "abc"),
-                       {.about = "too few for"}));
+                       {.field = "compressed data"}));
 }
 
 TEST(PcdFiles, HeaderLinesThatDoNotFit) {
@@ -176,7 +176,7 @@ TEST(PcdFiles, HeaderLinesThatDoNotFit) {
                        {.field = "TYPE and SIZE of field 'z'", .value = "Q 4"}));
   EXPECT_TRUE(is_error(changed("SIZE 4 4 4", "SIZE 4 4 2"),
                        {.field = "TYPE and SIZE of field 'z'", .value = "F 2"}));
-  EXPECT_TRUE(is_error(changed("FIELDS x y z", "FIELDS x y w"), {.about = "x, y"}));
+  EXPECT_TRUE(is_error(changed("FIELDS x y z", "FIELDS x y w"), {.field = "fields x, y and z"}));
   EXPECT_TRUE(is_error(changed("FIELDS x y z", "FIELDS x y z z"),
                        {.field = "header line SIZE", .value = "3 words long"}));
   EXPECT_TRUE(is_error(changed("FIELDS x y z", "FIELDS"), {.field = "header line FIELDS"}));

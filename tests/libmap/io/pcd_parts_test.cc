@@ -53,13 +53,13 @@ TEST(PcdParts, KeepTheirPromise) {
                          PcdPartsWriter writer(path, {.points = 9});
                          writer.append(cloud);
                        }),
-                       {.about = "more points"}));
+                       {.field = "number of points", .value = "10", .bound = "9"}));
   EXPECT_TRUE(is_error(error_of([&] {
                          PcdPartsWriter writer(path, {.points = 11});
                          writer.append(cloud);
                          writer.finish();
                        }),
-                       {.about = "fewer points"}));
+                       {.field = "number of points", .value = "10", .bound = "11"}));
   EXPECT_TRUE(is_error(error_of([&] {
                          PcdPartsWriter writer(path, {.points = 20});
                          writer.append(cloud);
@@ -67,7 +67,7 @@ TEST(PcdParts, KeepTheirPromise) {
                          other.fields.pop_back();
                          writer.append(other);
                        }),
-                       {.about = "different fields"}));
+                       {.field = "fields or viewpoints"}));
   EXPECT_TRUE(is_error(error_of([] { PcdPartsWriter("/no/such/folder/a.pcd", {}); }),
                        {.file = "/no/such/folder/a.pcd", .kind = ErrorKind::failed}));
 }

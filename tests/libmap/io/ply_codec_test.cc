@@ -68,12 +68,12 @@ TEST(PlyFiles, HeadersThatLie) {
   EXPECT_TRUE(is_error(error_as(".ply", ply_header("ascii", "3") + "1.5 2.5 3.5\n1.5 2.5 3.5\n"),
                        {.about = "row 2"}));
   EXPECT_TRUE(
-      is_error(error_as(".ply", ply_header("ascii", "1") + "1 2 3 4\n"), {.about = "than one"}));
+      is_error(error_as(".ply", ply_header("ascii", "1") + "1 2 3 4\n"), {.field = "line 8"}));
   EXPECT_TRUE(is_error(error_as(".ply", ply_header("ascii", "1") + "1 22 \n"), {.field = "z"}));
   for (const char* const points : {"9223372036854775807", "1537228672809129302", "1000000000000"})
     for (const char* const encoding : {"ascii", "binary_little_endian", "binary_big_endian"})
       EXPECT_TRUE(is_error(error_as(".ply", ply_header(encoding, points) + std::string(100, '1')),
-                           {.about = "declares"}));
+                           {.field = "number of rows of 'vertex'"}));
   for (const char* const points : {"-1", "1e3", "99999999999999999999", "x", ""})
     error_as(".ply", ply_header("ascii", points) + "1 2 3\n");
   error_as(".ply", ply_header("binary_middle_endian", "1") + "1 2 3\n");
@@ -84,7 +84,7 @@ TEST(PlyFiles, HeadersThatLie) {
   EXPECT_TRUE(is_error(error_as(".ply",
                                 "ply\nformat ascii 1.0\nelement point 1\nproperty float x\n"
                                 "end_header\n1\n"),
-                       {.about = "no element"}));
+                       {.field = "PLY header"}));
 }
 
 TEST(PlyFiles, HeaderLinesThatDoNotFit) {

@@ -156,7 +156,7 @@ TEST(VtpFiles, AreNotRead) {
         error_of([&] { read_mesh(path); }), error_of([&] { file_kind(path); })}) {
     EXPECT_EQ(error.kind(), ErrorKind::bad_input);
     EXPECT_EQ(error.context().file, path.string());
-    EXPECT_TRUE(is_error(error, {.about = "written only"}));
+    EXPECT_TRUE(is_error(error, {.file = "cloud.vtp"}));
   }
 }
 

@@ -432,14 +432,14 @@ TEST(PoissonDisk, BadInput) {
   const auto refusal = [](const TriangleMesh& bad) {
     return error_of([&] { by_radius(bad, 0.1); });
   };
-  EXPECT_TRUE(is_error(refusal({}), {.about = "no area"}));
+  EXPECT_TRUE(is_error(refusal({}), {.field = "mesh"}));
   TriangleMesh line = mesh;
   line.triangles = {{0, 0, 1}, {2, 2, 2}};
-  EXPECT_TRUE(is_error(refusal(line), {.about = "no area"}));
-  EXPECT_TRUE(is_error(error_of([&] { by_count(line, 10); }), {.about = "no area"}));
+  EXPECT_TRUE(is_error(refusal(line), {.field = "mesh"}));
+  EXPECT_TRUE(is_error(error_of([&] { by_count(line, 10); }), {.field = "mesh"}));
   TriangleMesh broken = mesh;
   broken.vertices[1].y() = nan;
-  EXPECT_TRUE(is_error(refusal(broken), {.about = "not finite"}));
+  EXPECT_TRUE(is_error(refusal(broken), {.field = "vertices of the mesh"}));
   broken = mesh;
   broken.triangles[1][2] = 4;
   EXPECT_TRUE(is_error(refusal(broken), {.field = "vertex of triangle 1", .value = "4"}));

@@ -222,12 +222,12 @@ TEST(RayCaster, RaysThatPointNowhereMeetNothing) {
 
 TEST(RayCaster, RefusesMeshesThatAreNone) {
   TriangleMesh mesh;
-  EXPECT_TRUE(is_error(error_of([&] { RayCaster{mesh}; }), {.about = "no triangles"}));
+  EXPECT_TRUE(is_error(error_of([&] { RayCaster{mesh}; }), {.field = "triangles of the mesh"}));
   mesh = square_mesh(0.0);
   mesh.triangles.push_back({0, 1, 9});
   EXPECT_EQ(error_of([&] { RayCaster{mesh}; }).context().value, "9");
   mesh = square_mesh(std::numeric_limits<double>::quiet_NaN());
-  EXPECT_TRUE(is_error(error_of([&] { RayCaster{mesh}; }), {.about = "not finite"}));
+  EXPECT_TRUE(is_error(error_of([&] { RayCaster{mesh}; }), {.field = "vertices of the mesh"}));
   std::vector<RayHit> hits(2);
   const RayCaster caster(square_mesh(0.0));
   EXPECT_EQ(error_of([&] {

@@ -152,12 +152,13 @@ TEST(ReferenceSurface, ThreadsMakeNoDifference) {
 }
 
 TEST(ReferenceSurface, WhatIsNoSurface) {
+  EXPECT_TRUE(is_error(error_of([] { ReferenceSurface(TriangleMesh{}); }),
+                       {.field = "triangles of the mesh"}));
   EXPECT_TRUE(
-      is_error(error_of([] { ReferenceSurface(TriangleMesh{}); }), {.about = "no triangles"}));
-  EXPECT_TRUE(is_error(error_of([] { ReferenceSurface(PointCloud{}); }), {.about = "no points"}));
+      is_error(error_of([] { ReferenceSurface(PointCloud{}); }), {.field = "points of the cloud"}));
   PointCloud cloud;
   cloud.positions = {{0, 0, 0}, {0, 0, std::numeric_limits<double>::infinity()}};
-  EXPECT_TRUE(is_error(error_of([&] { ReferenceSurface{cloud}; }), {.about = "not finite"}));
+  EXPECT_TRUE(is_error(error_of([&] { ReferenceSurface{cloud}; }), {.field = "points"}));
   cloud.positions.pop_back();
   EXPECT_NEAR(ReferenceSurface(cloud).nearest({3, 4, 0}).distance_m, 5.0, 1e-12);
 }

@@ -110,14 +110,15 @@ TEST(SurfaceDistance, AgreesWithASearchOfAllTriangles) {
 }
 
 TEST(SurfaceDistance, MeshesThatCannotBe) {
-  EXPECT_TRUE(is_error(error_of([] { SurfaceDistance({}); }), {.about = "no triangles"}));
+  EXPECT_TRUE(is_error(error_of([] { SurfaceDistance({}); }), {.field = "triangles of the mesh"}));
   TriangleMesh mesh = unit_square();
   mesh.triangles[0][1] = 9;
   EXPECT_TRUE(is_error(error_of([&] { SurfaceDistance{mesh}; }),
                        {.field = "vertex of triangle 0", .value = "9", .bound = "< 4"}));
   mesh = unit_square();
   mesh.vertices[2].y() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(is_error(error_of([&] { SurfaceDistance{mesh}; }), {.about = "not finite"}));
+  EXPECT_TRUE(
+      is_error(error_of([&] { SurfaceDistance{mesh}; }), {.field = "vertices of the mesh"}));
 }
 
 TEST(SurfaceDistance, Statistics) {
@@ -151,7 +152,7 @@ TEST(SurfaceDistance, SamplesAreSpreadByArea) {
   EXPECT_TRUE(is_error(error_of([&] { sample_surface(mesh, 1e12, 1); }),
                        {.field = "number of samples", .value = "2e+12 (1e+12 per m2)"}));
   mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}};
-  EXPECT_TRUE(is_error(error_of([&] { sample_surface(mesh, 10, 1); }), {.about = "no area"}));
+  EXPECT_TRUE(is_error(error_of([&] { sample_surface(mesh, 10, 1); }), {.field = "mesh"}));
 }
 
 // The number of samples is limited for a few large triangles, and larger for a large mesh.

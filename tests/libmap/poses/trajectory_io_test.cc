@@ -57,7 +57,7 @@ TEST(TrajectoryIo, NamesTheFormatsItKnows) {
   for (const auto format : {libmap::TrajectoryFormat::automatic, libmap::TrajectoryFormat::colmap})
     EXPECT_TRUE(graspmap_test::is_error(
         graspmap_test::error_of([&] { libmap::write_trajectory_as(format, path, example()); }),
-        {.file = path, .about = "format"}));
+        {.file = path}));
   EXPECT_FALSE(fs::exists(path));
 }
 
@@ -170,7 +170,7 @@ TEST(AssignNodes, RefusesPosesOfNoUse) {
       graspmap_test::is_error(graspmap_test::error_of([&] {
                                 libmap::assign_nodes({{9, 0, random_pose()}}, graph_of_nodes());
                               }),
-                              {.about = "none of the poses"}));
+                              {.field = "poses"}));
   EXPECT_TRUE(
       graspmap_test::is_error(graspmap_test::error_of([&] {
                                 libmap::assign_nodes({{0, 7.0, random_pose()}}, graph_of_nodes());
@@ -183,7 +183,7 @@ TEST(AssignNodes, RefusesPosesOfNoUse) {
       {.field = "node", .value = "2"}));
   EXPECT_TRUE(graspmap_test::is_error(
       graspmap_test::error_of([&] { libmap::assign_nodes({}, graph_of_nodes()); }),
-      {.about = "none of the poses"}));
+      {.field = "poses"}));
 }
 
 }  // namespace trajectory_io_test

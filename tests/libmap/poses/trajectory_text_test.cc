@@ -467,7 +467,7 @@ TEST(RecognizePoses, ByTagOrColumns) {
   EXPECT_EQ(error.context().field, "line 3");
   EXPECT_EQ(error.context().value, "7 columns long");
   EXPECT_TRUE(graspmap_test::is_error(graspmap_test::error_of([&] { format(""); }),
-                                      {.file = "poses.txt", .about = "no pose"}));
+                                      {.file = "poses.txt", .field = "poses"}));
 }
 
 }  // namespace trajectory_text_test

@@ -154,8 +154,8 @@ TEST(MapRaster, LargeOnesHaveTilesAndOverviews) {
 }
 
 TEST(MapRaster, BadInput) {
-  EXPECT_TRUE(
-      is_error(error_of([] { raster_of({}, {.pixel_size_m = 0.1}); }), {.about = "no points"}));
+  EXPECT_TRUE(is_error(error_of([] { raster_of({}, {.pixel_size_m = 0.1}); }),
+                       {.field = "points of the input"}));
   PointCloud far = voxels({{0, 0, 0}, {1, 1, 1}});
   far.positions[1] = {4e6, 4e6, 0};
   EXPECT_EQ(error_of([&] { raster_of(far, {.pixel_size_m = 0.1}); }).context().field,

@@ -193,12 +193,13 @@ TEST(Image, BrokenOnesAreErrors) {
   EXPECT_EQ(libmap::read_image_bytes(whole).height, 30);
   EXPECT_TRUE(
       is_error(error_of([&] { libmap::read_image_bytes(whole.substr(0, whole.size() / 2)); }),
-               {.about = "PNG is damaged"}));
-  EXPECT_TRUE(
-      is_error(error_of([&] { libmap::read_image_bytes("no picture"); }), {.about = "not a PNG"}));
-  EXPECT_TRUE(is_error(error_of([&] { libmap::read_image_bytes(""); }), {.about = "not a PNG"}));
-  EXPECT_TRUE(
-      is_error(error_of([&] { libmap::read_image_bytes("<svg><rect>"); }), {.about = "not a PNG"}));
+               {.field = "PNG data"}));
+  EXPECT_TRUE(is_error(error_of([&] { libmap::read_image_bytes("no picture"); }),
+                       {.field = "image", .bound = "PNG, JPEG or SVG"}));
+  EXPECT_TRUE(is_error(error_of([&] { libmap::read_image_bytes(""); }),
+                       {.field = "image", .bound = "PNG, JPEG or SVG"}));
+  EXPECT_TRUE(is_error(error_of([&] { libmap::read_image_bytes("<svg><rect>"); }),
+                       {.field = "image", .bound = "PNG, JPEG or SVG"}));
   const std::string filled = "<svg>" + std::string(std::size_t{4} << 20, ' ') + "</svg>";
   EXPECT_TRUE(is_error(error_of([&] { libmap::read_image_bytes(filled); }),
                        {.value = "4194315 bytes", .bound = "<= 4194304"}));

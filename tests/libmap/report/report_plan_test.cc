@@ -124,12 +124,12 @@ TEST(ReportPlan, OfTheCurrentFolder) {
 
 TEST(ReportPlan, OfNothing) {
   EXPECT_TRUE(is_error(error_of([] { libmap::plan_report(scratch_folder()); }),
-                       {.file = scratch_folder(), .about = "nothing"}));
+                       {.file = scratch_folder()}));
   EXPECT_TRUE(is_error(error_of([] { libmap::plan_report(scratch_folder() / "no"); }),
-                       {.file = graspmap_test::scratch_folder() / "no", .about = "no such"}));
+                       {.file = graspmap_test::scratch_folder() / "no"}));
   put("file", "");
   EXPECT_TRUE(is_error(error_of([&] { libmap::plan_report(scratch_folder() / "file"); }),
-                       {.file = graspmap_test::scratch_folder() / "file", .about = "folder"}));
+                       {.file = graspmap_test::scratch_folder() / "file"}));
 }
 
 TEST(ReportPlan, NaturalOrder) {

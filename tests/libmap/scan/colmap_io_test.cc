@@ -138,9 +138,11 @@ TEST(ColmapModel, IsFoundWhereColmapsToolsPutIt) {
 
 TEST(ColmapModel, SaysWhyThereIsNone) {
   const fs::path folder = scratch_folder();
-  EXPECT_TRUE(is_error(error_of([&] { find_colmap_model(folder); }), {.about = ".txt"}));
+  EXPECT_TRUE(is_error(error_of([&] { find_colmap_model(folder); }),
+                       {.file = "ColmapModel.SaysWhyThereIsNone"}));
   write_text(folder / "images.bin", "x");
-  EXPECT_TRUE(is_error(error_of([&] { find_colmap_model(folder); }), {.about = "model_converter"}));
+  EXPECT_TRUE(is_error(error_of([&] { find_colmap_model(folder); }),
+                       {.file = "ColmapModel.SaysWhyThereIsNone"}));
 }
 
 // COLMAP's projections by its documentation of camera models.

@@ -436,18 +436,17 @@ TEST_F(TumFolder, DropsLinksOfANodeToItself) {
   const FrameFolder read(folder_);
   EXPECT_EQ(read.graph().links.size(), 1U);
   ASSERT_EQ(read.warnings().size(), 1U);
-  EXPECT_TRUE(
-      graspmap_test::is_error_text(read.warnings()[0], {.file = "links.g2o", .about = "itself"}));
+  EXPECT_TRUE(graspmap_test::is_error_text(read.warnings()[0], {.file = "links.g2o"}));
 }
 
 TEST(FrameFolderError, OfFoldersThatAreNoScan) {
   const fs::path folder = new_folder();
   const libmap::Error error = graspmap_test::error_of([&] { libmap::open_scan(folder); });
   EXPECT_EQ(error.context().file, folder.string());
-  EXPECT_TRUE(graspmap_test::is_error(error, {.about = ".txt"}));
+  EXPECT_TRUE(graspmap_test::is_error(error, {.file = "scan"}));
   EXPECT_TRUE(
       graspmap_test::is_error(graspmap_test::error_of([&] { FrameFolder(folder / "missing"); }),
-                              {.file = folder / "missing", .about = "no such"}));
+                              {.file = folder / "missing"}));
 }
 
 TEST(FrameFolderError, OfNodesThatAreNotThere) {
@@ -466,7 +465,7 @@ TEST(FrameFolderError, OfFoldersThatCannotBeMade) {
         graspmap_test::error_of([&] { libmap::FrameFolderWriter writer(place); });
     EXPECT_EQ(error.context().file, (place / "color").string());
     EXPECT_TRUE(
-        graspmap_test::is_error(error, {.about = "be created:", .kind = libmap::ErrorKind::failed}))
+        graspmap_test::is_error(error, {.file = "color", .kind = libmap::ErrorKind::failed}))
         << error.what();
     EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
   }

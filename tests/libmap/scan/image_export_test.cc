@@ -39,8 +39,8 @@ TEST(ImageExport, NodesWithoutColorOrCalibrationAreNamed) {
   const auto refusal_of = [&](int node) {
     return error_of([&] { libmap::read_views(scan, node, {}); });
   };
-  EXPECT_TRUE(is_error(refusal_of(1), {.file = file, .field = "node 1", .about = "color"}));
-  EXPECT_TRUE(is_error(refusal_of(2), {.file = file, .field = "node 2", .about = "calibration"}));
+  EXPECT_TRUE(is_error(refusal_of(1), {.file = file, .field = "node 1"}));
+  EXPECT_TRUE(is_error(refusal_of(2), {.file = file, .field = "node 2"}));
 }
 
 }  // namespace image_export_test

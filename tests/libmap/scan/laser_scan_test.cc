@@ -60,7 +60,7 @@ TEST(LaserScan, WhatIsBroken) {
   EXPECT_TRUE(is_error(error_of([&] { libmap::check_laser_scan(blob, info_76(5).substr(1)); }),
                        {.value = "75 bytes", .bound = "56, 60 or 76 bytes"}));
   EXPECT_TRUE(is_error(error_of([&] { libmap::check_laser_scan(blob.substr(1), info_76(5)); }),
-                       {.about = "compressed matrix"}));
+                       {.field = "compressed matrix"}));
   for (const float points : {-1.0F, NAN, 3e9F}) {
     std::string info = info_76(5);
     info.replace(24, 4, bytes_of(std::vector<float>{points}));

@@ -297,7 +297,7 @@ TEST(PoseImport, NamesTheFileThatIsOfNoUse) {
   EXPECT_EQ(few.context().bound, "4");
   write_text(scratch_folder() / "none.txt", "# nothing\n");
   EXPECT_TRUE(is_error(error_of([&] { libmap::import_poses(scratch_folder() / "none.txt", scan); }),
-                       {.about = "no pose"}));
+                       {.field = "poses"}));
 }
 
 // Round trip of a real scan's stored poses by each format, to the precision of float32.

@@ -79,11 +79,11 @@ TEST(RigImages, BadFoldersAreNamed) {
   const auto said = [](const fs::path& folder) {
     return error_of([&] { list_rig_images(folder, rig_of({"left"})); });
   };
-  EXPECT_TRUE(is_error(said(scratch_folder() / "none"), {.about = "no such"}));
+  EXPECT_TRUE(is_error(said(scratch_folder() / "none"), {.file = "none"}));
   touch(scratch_folder() / "file");
-  EXPECT_TRUE(is_error(said(scratch_folder() / "file"), {.about = "a folder"}));
+  EXPECT_TRUE(is_error(said(scratch_folder() / "file"), {.file = "file"}));
   fs::create_directories(scratch_folder() / "empty" / "left");
-  EXPECT_TRUE(is_error(said(scratch_folder() / "empty"), {.about = "no image"}));
+  EXPECT_TRUE(is_error(said(scratch_folder() / "empty"), {.file = "empty"}));
   touch(scratch_folder() / "odd" / "left" / "first.png");
   EXPECT_TRUE(is_error(said(scratch_folder() / "odd"), {.field = "name", .value = "first"}));
 }
@@ -127,7 +127,7 @@ TEST(SynchronizedSets, FullestThenTightestThenEarliest) {
   for (const RigImage& image : images)
     EXPECT_LE(synchronized_set_at(images, 3, image.stamp_s, 0.02).seen(), 3U);
   EXPECT_TRUE(
-      is_error(error_of([&] { fullest_synchronized_set({}, 3, 0.02); }), {.about = "no images"}));
+      is_error(error_of([&] { fullest_synchronized_set({}, 3, 0.02); }), {.field = "images"}));
 }
 
 TEST(SynchronizedSets, FullestAgreesWithLookingAtEveryStamp) {
@@ -202,7 +202,7 @@ TEST(RigDepth, UnitsBecomeMeters) {
   EXPECT_TRUE(is_error(error_of([&] {
                          read_rig_depth({0, 1.0, file}, camera);
                        }),
-                       {.file = file, .about = "JPEG"}));
+                       {.file = file, .field = "image", .bound = "JPEG or PNG"}));
 }
 
 TEST(SynchronizedSets, EachImageIsInOneMoment) {

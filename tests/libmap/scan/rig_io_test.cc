@@ -95,7 +95,7 @@ TEST(RigIo, BadFilesNameCameraAndKey) {
   const std::string head = "cameras:\n  - name: front\n" + intrinsics;
   const std::string pose = "    robot_from_camera: [0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0]\n";
   const std::vector<std::pair<std::string, graspmap_test::ExpectedError>> files = {
-      {"", {.file = "bad.yaml", .about = "cameras"}},
+      {"", {.file = "bad.yaml"}},
       {"cameras: []", {.file = "bad.yaml", .field = "cameras"}},
       {"cameras: 3", {.file = "bad.yaml", .field = "cameras"}},
       {"camera: []", {.file = "bad.yaml", .field = "camera", .about = "'cameras'"}},

@@ -283,8 +283,7 @@ TEST(CopyWithOptimizedPoses, ReportsAFullDisk) {
       libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), landmarks);
     });
     EXPECT_EQ(error.context().file, scratch("b.db").string());
-    EXPECT_TRUE(
-        graspmap_test::is_error(error, {.about = "be written:", .kind = libmap::ErrorKind::failed}))
+    EXPECT_TRUE(graspmap_test::is_error(error, {.file = "b.db", .kind = libmap::ErrorKind::failed}))
         << error.what();
     EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
   }

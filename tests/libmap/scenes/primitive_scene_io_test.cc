@@ -125,11 +125,11 @@ TEST(SceneYaml, documents_of_another_form_are_errors) {
   for (const std::string text : {"", "shapes", "[]", "\xff\xfe"})
     EXPECT_TRUE(is_error(message_of(text), {.file = "scene.yaml", .about = "'shapes'"})) << text;
   EXPECT_TRUE(is_error(message_of("shapes: &a [*a]"), {.file = "scene.yaml", .about = "500000"}));
-  EXPECT_TRUE(is_error(message_of("? [1]\n: 2"), {.file = "scene.yaml", .about = "single value"}));
-  EXPECT_TRUE(is_error(message_of(std::string(100'000, '[')),
-                       {.file = "scene.yaml", .field = "line 1", .about = "YAML"}));
+  EXPECT_TRUE(is_error(message_of("? [1]\n: 2"), {.file = "scene.yaml", .field = "key"}));
+  EXPECT_TRUE(
+      is_error(message_of(std::string(100'000, '[')), {.file = "scene.yaml", .field = "line 1"}));
   EXPECT_TRUE(is_error(message_of("shapes:\n  - {shape: sphere\n"),
-                       {.file = "scene.yaml", .field = "line 3", .about = "YAML"}));
+                       {.file = "scene.yaml", .field = "line 3"}));
 }
 
 }  // namespace primitive_scene_io_test

@@ -277,8 +277,8 @@ TEST(SceneCheck, names_shape_parameter_value_and_bound) {
                        {.field = "shapes[0].length_m", .value = "0.3", .bound = ">= 0.4"}));
   EXPECT_TRUE(is_error(message({Plane{1.0, 1.0}, {.roll_deg = 90.0}, {}}),
                        {.field = "shapes[0].roll_deg, pitch_deg", .value = "90, 0"}));
-  EXPECT_TRUE(is_error(message({Bump{0.1, 0.2, BumpProfile::cosine}, {}, {}}),
-                       {.field = "shapes", .about = "bumps"}));
+  EXPECT_TRUE(
+      is_error(message({Bump{0.1, 0.2, BumpProfile::cosine}, {}, {}}), {.field = "shapes"}));
   EXPECT_TRUE(is_error(error_of([] { scene_of({}).check(); }), {.field = "shapes"}));
 }
 

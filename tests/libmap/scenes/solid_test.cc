@@ -86,7 +86,7 @@ TEST(ConvexSolid, NothingOrTooMuchIsAnError) {
       error_of([] {
         convex_solid({{Eigen::Vector3d::UnitX(), -2.0}, {-Eigen::Vector3d::UnitX(), 1.0}}, 10.0);
       }),
-      {.about = "empty"}));
+      {.field = "half-spaces"}));
   EXPECT_TRUE(is_error(error_of([] {
                          convex_solid({{Eigen::Vector3d::UnitX(), 1.0}}, 10.0);
                        }),
@@ -152,7 +152,7 @@ TEST(RefineFacets, ARegionThatIsNotFlatIsAnError) {
   Solid solid = box({0.0, 0.0, 0.0}, {1.0, 1.0, 1.0});
   for (int& label : solid.labels)
     if (label == 1 || label == 3) label = 0;
-  EXPECT_TRUE(is_error(error_of([&] { refine_facets(solid, 0.5); }), {.about = "two corners"}));
+  EXPECT_TRUE(is_error(error_of([&] { refine_facets(solid, 0.5); }), {.field = "corners"}));
 }
 
 TEST(Booleans, FollowInclusionAndExclusion) {
@@ -193,13 +193,13 @@ TEST(Booleans, TouchingSolidsAreAnErrorOrAManifold) {
   // Two boxes that share one edge alone have no manifold union.
   const Solid a = box({0.0, 0.0, 0.0}, {1.0, 1.0, 1.0});
   const Solid b = box({1.0, 1.0, 0.0}, {2.0, 2.0, 1.0});
-  EXPECT_TRUE(is_error(error_of([&] { unite({a, b}); }), {.about = "touch"}));
+  EXPECT_TRUE(is_error(error_of([&] { unite({a, b}); }), {.field = "union"}));
   // A box without two opposite quarters is not a manifold, either.
   const Solid rest = subtract(a, box({-1.0, -1.0, -1.0}, {0.5, 0.5, 2.0}));
   EXPECT_TRUE(is_error(error_of([&] {
                          subtract(rest, box({0.5, 0.5, -1.0}, {2.0, 2.0, 2.0}));
                        }),
-                       {.about = "difference"}));
+                       {.field = "difference of two solids"}));
 }
 
 TEST(Booleans, SplintersGoWithoutMovingTheSurface) {

@@ -165,7 +165,8 @@ TEST(CarryCamera, OneFrameOneTriangleAndNone) {
     EXPECT_TRUE(pose.world_from_base.matrix().allFinite());
   mesh.vertices.clear();
   mesh.triangles.clear();
-  EXPECT_TRUE(is_error(error_of([&] { carry_camera(mesh, {}, 1); }), {.about = "no vertices"}));
+  EXPECT_TRUE(
+      is_error(error_of([&] { carry_camera(mesh, {}, 1); }), {.field = "vertices of the mesh"}));
 }
 
 TEST(SurroundingGroundHeight, IsNotTiltedByRocks) {
@@ -240,7 +241,7 @@ TEST(Serpentine, GroundNarrowerThanALane) {
     EXPECT_TRUE(pose.world_from_base.matrix().allFinite());
   }
   EXPECT_TRUE(is_error(error_of([&] { libmap::serpentine_motion({}, options, 1); }),
-                       {.about = "no points"}));
+                       {.field = "points of the terrain"}));
 }
 
 TEST(MotionThrough, GivenPosesAndScrewsBetweenThem) {

@@ -150,7 +150,7 @@ TEST(SurfaceView, RockWhereTheMeshHasNoTexture) {
   libmap::TriangleMesh mesh = square_mesh(0.0);
   EXPECT_GT(spread(mesh, libmap::TextureSource::automatic), 0.05);
   EXPECT_TRUE(is_error(error_of([&] { VisibleSurface(mesh, libmap::TextureSource::mesh); }),
-                       {.about = "vertex colors"}));
+                       {.field = "vertex colors"}));
   mesh.vertex_colors.assign(4, {150, 150, 150});
   EXPECT_GT(spread(mesh, libmap::TextureSource::automatic), 0.05);
   EXPECT_LT(spread(mesh, libmap::TextureSource::mesh), 1e-3);
@@ -359,7 +359,7 @@ TEST(DepthCamera, SameImagesForAnyThreadCountAndOthersForAnotherSeed) {
 
 TEST(DepthCamera, RefusesWhatCannotBe) {
   EXPECT_TRUE(is_error(error_of([&] { VisibleSurface{libmap::TriangleMesh{}}; }),
-                       {.about = "no triangles"}));
+                       {.field = "triangles of the mesh"}));
   DepthSensorOptions options;
   options.far_m = options.near_m;
   EXPECT_EQ(error_of([&] { options.check(); }).context().field, "far_m");

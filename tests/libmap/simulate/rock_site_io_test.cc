@@ -130,7 +130,7 @@ TEST(RockSiteIo, SaysWhatIsWrong) {
       {"seed: -1", {.file = "site.yaml", .field = "seed", .value = "-1", .bound = ">= 0"}},
       {"seed: 1\nseed: 2", {.file = "site.yaml", .field = "seed"}},
       {"rocks: [", {.file = "site.yaml", .field = "line 1"}},
-      {"7", {.file = "site.yaml", .about = "map"}},
+      {"7", {.file = "site.yaml"}},
   };
   for (const BadCase& one : cases) {
     const Error error = error_of([&] { parse(one.text); });

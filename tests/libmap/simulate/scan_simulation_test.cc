@@ -276,14 +276,14 @@ TEST(SimulateScan, NothingToSeeIsAnError) {
   const auto nothing = [](const auto&, const auto&) {};
   EXPECT_TRUE(is_error(
       error_of([&] { libmap::simulate_scan(libmap::TriangleMesh{}, small_scan(), nothing); }),
-      {.about = "no triangles"}));
+      {.field = "triangles of the mesh"}));
   // Inside a ball nothing is far enough; before a mesh a thousand times too large nothing near.
   ScanSimulationOptions options = small_scan();
   options.trajectory.radius_m = options.trajectory.last_radius_m = 0.01;
   options.trajectory.height_m = options.trajectory.last_height_m = 0.01;
   const libmap::TriangleMesh ball = ball_mesh(20, 40, {0, 0, 0}, 0.2);
   EXPECT_TRUE(is_error(error_of([&] { libmap::simulate_scan(ball, options, nothing); }),
-                       {.about = "no frame"}));
+                       {.field = "frames"}));
 }
 
 }  // namespace scan_simulation_test

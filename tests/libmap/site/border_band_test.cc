@@ -203,7 +203,7 @@ TEST(BorderBand, WhatHasNone) {
   PointCloud cloud = floor_with_band(o);
   PointCloud gray = cloud;
   gray.colors.clear();
-  EXPECT_TRUE(is_error(refusal(gray), {.about = "no colors"}));
+  EXPECT_TRUE(is_error(refusal(gray), {.field = "colors"}));
   PointCloud high = cloud;
   for (Eigen::Vector3d& point : high.positions) point.z() += 3;
   EXPECT_TRUE(
@@ -216,7 +216,7 @@ TEST(BorderBand, WhatHasNone) {
   o.rocks = true;
   EXPECT_TRUE(is_error(refusal(floor_with_band(o)), {.field = "white share of each side"}))
       << "rocks alone are no band";
-  EXPECT_TRUE(is_error(error_of([&] { find_border_band({}); }), {.about = "no colors"}));
+  EXPECT_TRUE(is_error(error_of([&] { find_border_band({}); }), {.field = "colors"}));
   // Three sides of a band.
   PointCloud open;
   for (std::size_t n = 0; n < cloud.size(); ++n)

@@ -141,7 +141,7 @@ TEST(Crop, PiecesAreCutAsTheWhole) {
   }
   CropOptions beside = box_options({70, 70}, {71, 71});
   EXPECT_TRUE(is_error(error_of([&] { crop_mesh_tiles(each, beside, [](const TriangleMesh&) {}); }),
-                       {.about = "inside the crop region"}));
+                       {.field = "mesh"}));
 }
 
 TEST(Crop, BoxInTheLevelFrame) {
@@ -256,18 +256,18 @@ TEST(Crop, WhatCannotBe) {
   const auto message = [](const CropOptions& options) {
     return error_of([&] { crop_cloud(site_cloud(), options); });
   };
-  EXPECT_TRUE(is_error(message(box_options({50, 50}, {51, 51})), {.about = "no part of"}));
+  EXPECT_TRUE(is_error(message(box_options({50, 50}, {51, 51})), {.field = "cloud"}));
   EXPECT_TRUE(is_error(error_of([] {
                          crop_mesh(site_mesh(), box_options({50, 50}, {51, 51}));
                        }),
-                       {.about = "no part of"}));
+                       {.field = "mesh"}));
   EXPECT_TRUE(is_error(message(box_options({1, 0}, {0, 1})), {.field = "box"}));
   CropOptions options;
   options.region = CropRegion::polygon;
   options.polygon = {{0, 0}, {1, 1}};
   EXPECT_TRUE(is_error(message(options), {.field = "corners", .value = "2", .bound = ">= 3"}));
   options.region = CropRegion::border;
-  EXPECT_TRUE(is_error(message(options), {.about = "no colors"}));
+  EXPECT_TRUE(is_error(message(options), {.field = "colors"}));
   options = box_options({0, 0}, {1, 1});
   options.rectangle.margin_m = 0.1;
   EXPECT_TRUE(is_error(message(options), {.field = "margin_m", .value = "0.1"}));
@@ -279,12 +279,13 @@ TEST(Crop, WhatCannotBe) {
   options = {};
   options.yaw_deg = std::numeric_limits<double>::infinity();
   EXPECT_TRUE(is_error(message(options), {.field = "yaw", .value = "inf"}));
-  EXPECT_TRUE(is_error(error_of([&] { crop_cloud({}, {}); }), {.about = "no finite points"}));
+  EXPECT_TRUE(is_error(error_of([&] { crop_cloud({}, {}); }), {.field = "points of the cloud"}));
   EXPECT_TRUE(is_error(error_of([&] { crop_mesh({}, {}); }),
                        {.field = "area", .value = "0 m2", .bound = "> 0"}));
   TriangleMesh broken = site_mesh();
   broken.vertices[2].x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(is_error(error_of([&] { crop_mesh(broken, {}); }), {.about = "not finite"}));
+  EXPECT_TRUE(
+      is_error(error_of([&] { crop_mesh(broken, {}); }), {.field = "corners of triangles"}));
   PointCloud with_nan = site_cloud();
   with_nan.positions[4].z() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(crop_cloud(with_nan, {}).cloud.size(), site_cloud().size() - 1);

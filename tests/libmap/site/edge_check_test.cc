@@ -91,11 +91,11 @@ TEST(EdgeCheck, PlacesWithoutDataAreEmptyNotZero) {
   EXPECT_TRUE(is_error(error_of([&] {
                          check_edges(corners_of({-1, -1}, {1, 1}), nothing, zero);
                        }),
-                       {.about = "no position"}));
+                       {.field = "positions"}));
   EXPECT_TRUE(is_error(error_of([&] {
                          check_edges(corners_of({-1, -1}, {1, 1}), zero, nothing);
                        }),
-                       {.about = "no position"}));
+                       {.field = "positions"}));
 }
 
 TEST(EdgeCheck, HeightsOfACloudAreMedians) {
@@ -143,7 +143,7 @@ TEST(EdgeCheck, LeastRectangleOfATurnedSite) {
 }
 
 TEST(EdgeCheck, SitesThatCannotBe) {
-  EXPECT_TRUE(is_error(error_of([] { bounding_corners({}, false); }), {.about = "no point"}));
+  EXPECT_TRUE(is_error(error_of([] { bounding_corners({}, false); }), {.field = "points"}));
   for (const bool turned : {false, true}) {
     EXPECT_TRUE(is_error(error_of([&] {
                            bounding_corners({{1, 2, 3}}, turned);

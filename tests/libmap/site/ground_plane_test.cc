@@ -276,11 +276,11 @@ TEST(GroundPlane, WhatCannotBe) {
   EXPECT_EQ(error_of([&] { find_ground_plane({{0, 0, 0}, {1, 0, 0}}); }).context().value, "2");
   Points line;
   for (int n = 0; n < 100; ++n) line.emplace_back(0.3 * n, 0.1 * n, 1);
-  EXPECT_TRUE(is_error(error_of([&] { find_ground_plane(line); }), {.about = "one line"}));
+  EXPECT_TRUE(is_error(error_of([&] { find_ground_plane(line); }), {.field = "points"}));
   EXPECT_TRUE(is_error(error_of([&] {
                          find_ground_plane(Points(50, {1, 2, 3}));
                        }),
-                       {.about = "one line"}));
+                       {.field = "points"}));
   Points wall;
   add_patch(wall, 2000, {0, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0.002);
   EXPECT_TRUE(is_error(error_of([&] { find_ground_plane(wall); }),

@@ -115,7 +115,7 @@ TEST(SiteRectangle, LargestIsNamedIfItDoesNotFit) {
 
 TEST(SiteRectangle, WhatCannotBe) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(is_error(error_of([&] { find_site_rectangle({}, {3, 3}); }), {.about = "no points"}));
+  EXPECT_TRUE(is_error(error_of([&] { find_site_rectangle({}, {3, 3}); }), {.field = "points"}));
   EXPECT_TRUE(is_error(error_of([&] {
                          find_site_rectangle({{1, 1}}, {3, 3});
                        }),

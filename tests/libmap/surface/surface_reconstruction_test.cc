@@ -381,12 +381,12 @@ TEST_P(Reconstruction, CloudsThatAreTooThin) {
   const auto refusal = [&](const PointCloud& cloud) {
     return error_of([&] { reconstruct(cloud); });
   };
-  EXPECT_TRUE(is_error(refusal({}), {.about = "no normals"}));
+  EXPECT_TRUE(is_error(refusal({}), {.field = "normals"}));
   PointCloud cloud = plane(0.1, 0.01);
   cloud.normals.clear();
-  EXPECT_TRUE(is_error(refusal(cloud), {.about = "no normals"}));
+  EXPECT_TRUE(is_error(refusal(cloud), {.field = "normals"}));
   cloud.normals.assign(cloud.size(), Eigen::Vector3f::Zero());
-  EXPECT_TRUE(is_error(refusal(cloud), {.about = "has a normal"}));
+  EXPECT_TRUE(is_error(refusal(cloud), {.field = "normals"}));
   PointCloud two;
   two.positions = {{0, 0, 0}, {1, 0, 0}, {1, 0, 0}};
   two.normals.assign(3, Eigen::Vector3f::UnitZ());
@@ -394,7 +394,7 @@ TEST_P(Reconstruction, CloudsThatAreTooThin) {
   PointCloud line;
   for (int n = 0; n < 100; ++n) line.positions.emplace_back(0.01 * n, 1.0, 2.0);
   line.normals.assign(100, Eigen::Vector3f::UnitZ());
-  EXPECT_TRUE(is_error(refusal(line), {.about = "on a line"}));
+  EXPECT_TRUE(is_error(refusal(line), {.field = "number of distinct points", .value = "100"}));
 }
 
 TEST_P(Reconstruction, AFewPointsDoNoHarm) {

@@ -352,8 +352,8 @@ TEST(TextureModel, FramesThatCannotBeUsed) {
   scan.without_color = true;
   EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(mesh, scan, scan.poses()); }),
                        {.file = "painted", .about = "4 frames"}));
-  EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(mesh, scan, {}); }),
-                       {.file = "painted", .about = "no frame has a pose"}));
+  EXPECT_TRUE(
+      is_error(error_of([&] { libmap::texture_mesh(mesh, scan, {}); }), {.file = "painted"}));
 }
 
 TEST(TextureModel, MeshesThatCannotBeTextured) {
@@ -364,11 +364,11 @@ TEST(TextureModel, MeshesThatCannotBeTextured) {
   EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(far, scan, scan.poses()); }),
                        {.about = "3 photographs"}));
   EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh({}, scan, scan.poses()); }),
-                       {.about = "no triangles"}));
+                       {.field = "triangles of the mesh"}));
   TriangleMesh broken = mesh;
   broken.vertices[3].z() = std::nan("");
   EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(broken, scan, scan.poses()); }),
-                       {.about = "not finite"}));
+                       {.field = "vertices of the mesh"}));
   // Triangles without area, and triangles with a repeated vertex, are not seen.
   TriangleMesh slivers = mesh;
   slivers.triangles.push_back({0, 0, 5});

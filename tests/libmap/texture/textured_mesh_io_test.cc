@@ -239,7 +239,7 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
                 .bound,
             ".obj or .glb");
   EXPECT_TRUE(is_error(error_of([&] { libmap::read_textured_mesh(folder / "none.obj"); }),
-                       {.file = folder / "none.obj", .about = "no such"}));
+                       {.file = folder / "none.obj"}));
   graspmap_test::write_text(folder / "endless.obj", "v 0 0 0\n");
   std::filesystem::resize_file(folder / "endless.obj", std::uintmax_t{1} << 43U);
   EXPECT_EQ(error_of([&] { libmap::read_textured_mesh(folder / "endless.obj"); }).context().field,
@@ -247,10 +247,10 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
   graspmap_test::write_textured_mesh(folder / "m.obj", model);
   std::filesystem::remove(folder / "m_1.png");
   EXPECT_TRUE(is_error(error_of([&] { libmap::read_textured_mesh(folder / "m.obj"); }),
-                       {.file = graspmap_test::scratch_folder() / "m_1.png", .about = "no such"}));
+                       {.file = graspmap_test::scratch_folder() / "m_1.png"}));
   graspmap_test::write_text(folder / "m_1.png", "this is no picture");
   EXPECT_TRUE(is_error(error_of([&] { libmap::read_textured_mesh(folder / "m.obj"); }),
-                       {.file = folder / "m_1.png", .about = "JPEG"}));
+                       {.file = folder / "m_1.png", .field = "image", .bound = "JPEG or PNG"}));
   // Without its materials it has no texture.
   std::filesystem::remove(folder / "m.mtl");
   EXPECT_FALSE(libmap::read_textured_mesh(folder / "m.obj").has_texture());
@@ -261,7 +261,7 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
         folder / "cut.glb",
         whole.substr(0, static_cast<std::size_t>(fraction * static_cast<double>(whole.size()))));
     EXPECT_TRUE(is_error(error_of([&] { libmap::read_textured_mesh(folder / "cut.glb"); }),
-                         {.file = folder / "cut.glb", .about = "glb"}))
+                         {.file = folder / "cut.glb"}))
         << fraction;
   }
   for (const std::size_t at : {12U, 13U, 14U, 15U}) {  // the length of the text
@@ -285,7 +285,7 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
                {.field = "texture_coordinates", .value = "31 values", .bound = "32"}));
   EXPECT_TRUE(is_error(
       error_of([&] { graspmap_test::write_textured_mesh(folder / "w.glb", TexturedMesh{}); }),
-      {.about = "no triangles"}));
+      {.field = "triangles of the mesh"}));
 }
 
 TEST(TexturedMesh, AImageOfManyNamesIsOnePage) {

@@ -153,7 +153,7 @@ TEST(ColorPoints, FlagsGraspableBeforeConvex) {
   Coloring coloring;
   coloring.mode = ColorMode::flags;
   EXPECT_EQ(color(cloud, coloring).colors,
-            (std::vector<Color>{convex_color, intersection_color, intersection_color, rest_color}));
+            (std::vector<Color>{convex_color, graspable_color, graspable_color, rest_color}));
 }
 
 TEST(ColorPoints, FlagsTellObstaclesFromTheRest) {
@@ -163,8 +163,8 @@ TEST(ColorPoints, FlagsTellObstaclesFromTheRest) {
   Coloring coloring;
   coloring.mode = ColorMode::flags;
   const auto result = color(cloud, coloring);
-  EXPECT_EQ(result.colors, (std::vector<Color>{intersection_color, obstacle_color,
-                                               unreachable_color, rest_color}));
+  EXPECT_EQ(result.colors,
+            (std::vector<Color>{graspable_color, obstacle_color, unreachable_color, rest_color}));
   EXPECT_EQ(result.legend.entries.size(), 4U);
 }
 

@@ -98,7 +98,7 @@ TEST_F(VirtualDisplayTest, NamesThePackageThatIsMissing) {
   const Error error = error_of([] { const VirtualDisplay display; });
   setenv("PATH", path.c_str(), 1);
   EXPECT_EQ(error.kind(), ErrorKind::failed);
-  EXPECT_TRUE(is_error(error, {.about = "xvfb", .kind = libmap::ErrorKind::failed}));
+  EXPECT_TRUE(is_error(error, {.field = "program Xvfb", .kind = libmap::ErrorKind::failed}));
 }
 
 TEST_F(VirtualDisplayTest, AServerThatDoesNotComeUpIsAnError) {
@@ -110,7 +110,7 @@ TEST_F(VirtualDisplayTest, AServerThatDoesNotComeUpIsAnError) {
   const Error error = error_of([] { const VirtualDisplay display; });
   setenv("PATH", path.c_str(), 1);
   EXPECT_EQ(error.kind(), ErrorKind::failed);
-  EXPECT_TRUE(is_error(error, {.about = "start", .kind = libmap::ErrorKind::failed}));
+  EXPECT_TRUE(is_error(error, {.field = "start of Xvfb", .kind = libmap::ErrorKind::failed}));
   EXPECT_EQ(variable("DISPLAY"), "(unset)");
   EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1);
 }
@@ -125,7 +125,7 @@ TEST_F(VirtualDisplayTest, AServerWithoutOpenGlIsAnError) {
   const Error error = error_of([] { const VirtualDisplay display; });
   setenv("PATH", path.c_str(), 1);
   EXPECT_EQ(error.kind(), ErrorKind::failed);
-  EXPECT_TRUE(is_error(error, {.about = "OpenGL", .kind = libmap::ErrorKind::failed}));
+  EXPECT_TRUE(is_error(error, {.field = "OpenGL", .kind = libmap::ErrorKind::failed}));
   EXPECT_EQ(variable("DISPLAY"), "(unset)");
   EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1);
 }
@@ -136,7 +136,7 @@ TEST_F(VirtualDisplayTest, WithoutAFileLeftToOpenItIsAnError) {
     const VirtualDisplay display;
   });
   EXPECT_EQ(error.kind(), ErrorKind::failed);
-  EXPECT_TRUE(is_error(error, {.about = "Too many open files", .kind = libmap::ErrorKind::failed}));
+  EXPECT_TRUE(is_error(error, {.field = "pipe to Xvfb", .kind = libmap::ErrorKind::failed}));
   EXPECT_EQ(variable("LIBGL_ALWAYS_SOFTWARE"), "(unset)");
 }
 
@@ -182,7 +182,7 @@ TEST(DrawOffscreen, WhatVtkSaysIsTheReason) {
 TEST(DrawOffscreen, AImageWithoutPixelsCannotBeReadBack) {
   const Error error = error_of([] { draw_offscreen(0, 0, [](vtkRenderWindow&) {}); });
   EXPECT_EQ(error.kind(), ErrorKind::failed);
-  EXPECT_TRUE(is_error(error, {.about = "read back", .kind = libmap::ErrorKind::failed}));
+  EXPECT_TRUE(is_error(error, {.field = "OpenGL", .kind = libmap::ErrorKind::failed}));
 }
 
 }  // namespace offscreen_test

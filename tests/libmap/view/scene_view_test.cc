@@ -305,13 +305,13 @@ TEST_F(SceneViewTest, DegenerateScenesAreDrawnOrRefused) {
        {Viewpoint::top, Viewpoint::oblique, Viewpoint::front, Viewpoint::side})
     EXPECT_EQ(render_scene(lone, bare(100, 100, view)).at(50, 50), red);
   Scene empty;
-  EXPECT_TRUE(is_error(error_of([&] { render_scene(empty, {}); }), {.about = "to draw"}));
+  EXPECT_TRUE(is_error(error_of([&] { render_scene(empty, {}); }), {.field = "points"}));
   empty.layers.emplace_back();
-  EXPECT_TRUE(is_error(error_of([&] { render_scene(empty, {}); }), {.about = "to draw"}));
+  EXPECT_TRUE(is_error(error_of([&] { render_scene(empty, {}); }), {.field = "points"}));
   Scene no_numbers;
   no_numbers.layers.push_back(
       colored_points({{0, std::numeric_limits<double>::quiet_NaN(), 0}}, {red}, 0.0));
-  EXPECT_TRUE(is_error(error_of([&] { render_scene(no_numbers, {}); }), {.about = "to draw"}));
+  EXPECT_TRUE(is_error(error_of([&] { render_scene(no_numbers, {}); }), {.field = "points"}));
   Scene torn = lone;
   std::get<PointCloud>(torn.layers[0].shape).colors.push_back(red);
   EXPECT_TRUE(is_error(error_of([&] { render_scene(torn, {}); }),
@@ -348,7 +348,7 @@ TEST(ImageFile, IsWrittenWholeAndRefusedTorn) {
                          to_png(broken);
                        }),
                        {.field = "pixels", .value = "3", .bound = "4"}));
-  EXPECT_TRUE(is_error(error_of([] { to_png({}); }), {.about = "pixels"}));
+  EXPECT_TRUE(is_error(error_of([] { to_png({}); }), {.field = "pixels"}));
   // libpng would abort the program.
   const Error wide = error_of([] { to_png(ColorImage(1'000'001, 1)); });
   EXPECT_EQ(wide.context().value, "1000001 x 1");

@@ -103,8 +103,8 @@ TEST(HeightField, LeavesOutOverhangs) {
 TEST(HeightField, BadMeshes) {
   TriangleMesh ceiling = square_mesh(0.0);
   for (libmap::Triangle& t : ceiling.triangles) std::swap(t[0], t[1]);
-  EXPECT_TRUE(
-      is_error(error_of([&] { libmap::make_height_field(ceiling, {}); }), {.about = "faces up"}));
+  EXPECT_TRUE(is_error(error_of([&] { libmap::make_height_field(ceiling, {}); }),
+                       {.field = "triangles of the mesh"}));
   const libmap::Error error =
       error_of([] { libmap::make_height_field(square_mesh(0.0, 1e3), {.cell_size_m = 1e-3}); });
   EXPECT_EQ(error.context().field, "cell_size_m");
