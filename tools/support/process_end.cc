@@ -94,7 +94,9 @@ void require_printed() {
   std::fflush(stdout);
   // Failed writes are visible in the streams' state only.
   if (std::cout && std::ferror(stdout) == 0) return;
-  throw libmap::system_failure("standard output", "cannot be written", errno);
+  // The cause of an earlier failed write is lost, but writing again fails for the same cause.
+  const bool is_known = errno != 0 || write(STDOUT_FILENO, "\n", 1) < 0;
+  throw libmap::system_failure("standard output", "cannot be written", is_known ? errno : 0);
 }
 
 int exit_code_of_printing(const std::string& program) {

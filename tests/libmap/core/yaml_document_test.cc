@@ -87,7 +87,7 @@ TEST(YamlDocument, KeysAreKnownAndThereOnce) {
   };
   EXPECT_TRUE(is_error(fault("{name: a, radus: 1}"), {.field = "radus", .about = "'radius'"}));
   EXPECT_TRUE(is_error(fault("{name: a, name: b}"), {.field = "name"}));
-  EXPECT_TRUE(is_error(fault("{[1]: a}"), {.field = "key"}));
+  EXPECT_TRUE(is_error(fault("{[1]: a}"), {.field = "key of a mapping"}));
   EXPECT_NO_THROW(libmap::check_keys(YAML::Load("{name: a}"), {"radius", "name"}));
 }
 
