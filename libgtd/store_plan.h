@@ -41,7 +41,7 @@ void require_in_frame(const libmap::PointCloud& terrain, const TerrainFrame& fra
 void require_appendable(const TilePlan& earlier, const TilePlan& plan,
                         const DetectionOptions& detection, bool append, const std::string& store);
 
-// Returns the tiles of `done` that the files added to `earlier` in `plan` cannot affect.
+// Returns the tiles in `done` that no added file (in `plan`, but not in `earlier`) can affect.
 std::vector<StoredTile> unaffected_tiles(const std::map<TileNumber, StoredTile>& done,
                                          const TilePlan& earlier, const TilePlan& plan,
                                          const TerrainFrame& frame, const StoreTiling& tiling);
