@@ -35,9 +35,9 @@ TerrainFrame frame_of(const TilePlan& plan, const DetectionOptions& detection,
 void require_in_frame(const libmap::PointCloud& terrain, const TerrainFrame& frame,
                       const std::filesystem::path& plan_file);
 
-// Throws Error naming the store unless files can be added: `append` is set, `plan` is `earlier`
-// with further files, and points affect only tiles near them, i.e. the frame is PlaneSource::none
-// and the method corrected or calibrated.
+// Throws Error naming the store unless `append` is set, `plan` has the parameters and files of
+// `earlier` and further files, and points affect only tiles near them (PlaneSource::none with
+// method corrected or calibrated).
 void require_appendable(const TilePlan& earlier, const TilePlan& plan,
                         const DetectionOptions& detection, bool append, const std::string& store);
 

@@ -93,8 +93,8 @@ struct PlannedPull {
   double information_bits = 0.0;  // expected entropy reduction of the sets' weights
 };
 
-// Returns at most `count` pulls (tilt 0 or 45 degrees) with the most information, in descending
-// order, at most one per candidate (mesh frame, m) with contact. Throws Error without `fingers`.
+// Returns at most `count` pulls (tilt 0 or 45 degrees) with the most information (descending), at
+// most one per candidate (mesh frame, m) with contact. Throws Error as require_fingers does.
 std::vector<PlannedPull> plan_pulls(const Ground& ground, const Gripper& gripper,
                                     const std::vector<Eigen::Vector3d>& candidates,
                                     std::size_t count, const PullFitOptions& options,
