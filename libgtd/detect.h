@@ -20,14 +20,14 @@
 namespace libgtd {
 
 // Source of the terrain frame. fit: downsamples the cloud (methods thesis and envelope only), fits
-// the regression plane and transforms the cloud into its frame. none: the cloud's frame.
+// the regression plane and transforms the cloud into the plane's frame. none: the cloud's frame.
 enum class PlaneSource { fit, none };
 
 struct DetectionOptions {
   Scenario scenario;
   std::optional<Gripper> gripper;  // default: the gripper named by the scenario
   PlaneSource plane = PlaneSource::fit;
-  std::optional<Eigen::Vector3d> up;  // out of the ground, cloud's frame; nullopt: as in UpSource
+  std::optional<Eigen::Vector3d> up;  // out of ground, cloud's frame; nullopt: estimated (UpSource)
   double max_tilt_deg = 90.0;         // maximum angle between `up` and the plane's normal
 };
 // Binds the keys of the scenario and `plane`, but not `up` and `max_tilt_deg`.
@@ -50,7 +50,7 @@ struct DetectionResult {
   std::size_t convex_points = 0;     // curvature points that are convex
   std::size_t graspable_voxels = 0;
   std::size_t border_voxels = 0;          // the mask window extends beyond the scanned area
-  std::size_t unoriented_voxels = 0;      // without a normal (orientation surface): upright mask
+  std::size_t unoriented_voxels = 0;      // orientation surface: no normal, so upright mask
   std::size_t obstacle_voxels = 0;        // obstacles and unreachable voxels
   std::optional<double> normal_radius_m;  // nullopt if no surface normals were fitted
   libmap::StageTimings timings_s;         // wall time of each step

@@ -35,13 +35,13 @@ TerrainFrame frame_of(const TilePlan& plan, const DetectionOptions& detection,
 void require_in_frame(const libmap::PointCloud& terrain, const TerrainFrame& frame,
                       const std::filesystem::path& plan_file);
 
-// Throws Error naming the store unless files can be added: `append` is set, `plan` is `earlier`
-// with further files, and points affect only tiles near them, i.e. the frame is PlaneSource::none
-// and the method corrected or calibrated.
+// Throws Error naming the store unless `append` is set, `plan` has the parameters and files of
+// `earlier` and further files, and points affect only tiles near them (PlaneSource::none with
+// method corrected or calibrated).
 void require_appendable(const TilePlan& earlier, const TilePlan& plan,
                         const DetectionOptions& detection, bool append, const std::string& store);
 
-// Returns the tiles of `done` that the files added to `earlier` in `plan` cannot affect.
+// Returns the tiles in `done` that no added file (in `plan`, but not in `earlier`) can affect.
 std::vector<StoredTile> unaffected_tiles(const std::map<TileNumber, StoredTile>& done,
                                          const TilePlan& earlier, const TilePlan& plan,
                                          const TerrainFrame& frame, const StoreTiling& tiling);

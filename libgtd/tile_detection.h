@@ -43,7 +43,7 @@ MapContent content_of(const Scenario& scenario);
 // Options for the curvature near scored voxels and the convexity test.
 struct ConvexityStage {
   CurvatureOptions curvature;
-  bool average_per_voxel = true;  // from the mean point of each voxel: density has no effect
+  bool average_per_voxel = true;  // one mean point per voxel is used: density has no effect
   double zero_plane_m = 0.0;      // CurvatureMethod::thesis only: minimum height of convex points
   double distance_m = 0.01;       // maximum distance from a convex voxel to a convex point
 };
@@ -51,7 +51,7 @@ struct ConvexityStage {
 // Conditions for a scored voxel to be graspable.
 struct GraspableRule {
   Method method = Method::calibrated;
-  int solid_voxel_threshold = 120;  // TSV (score_percent); climblab: SSV must be larger
+  int solid_voxel_threshold = 120;  // TSV in score_percent, meets_threshold (voxel_matching.h)
   double score_threshold = 0.8;     // minimum score; not used by Method::climblab
   double zero_plane_m = 0.0;        // minimum height of the voxel's center, terrain frame
   bool needs_convexity = false;     // the voxel must be near a convex point
@@ -60,7 +60,7 @@ struct GraspableRule {
 // Options of detect_tiles; tile_detection_options derives them from a scenario.
 struct TileDetectionOptions {
   bool tilts_mask = false;                  // mask axis along the surface normal
-  std::optional<double> normal_radius_m;    // nullopt: no normals or slopes
+  std::optional<double> normal_radius_m;    // radius of normal fits; nullopt: no fits
   std::optional<ConvexityStage> convexity;  // nullopt: not evaluated
   GraspableRule graspable;
 };

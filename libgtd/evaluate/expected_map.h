@@ -21,7 +21,7 @@ struct ExpectedRegion {
   Eigen::Vector3d from = Eigen::Vector3d::Zero();  // ends of the segment, m
   Eigen::Vector3d to = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
-  std::optional<bool> graspable;  // expectation; nullopt: undecided
+  std::optional<bool> graspable;  // expectation; nullopt: region is "undecided"
   std::string reason;             // reason of the expectation
 
   // Returns true if the point is at most radius_m from the segment.
@@ -47,7 +47,7 @@ ExpectedMap parse_expected_map(const libmap::Table& table);
 ExpectedMap transformed(const ExpectedMap& expected, const libmap::Pose& map_from_expected);
 
 struct RegionResult {
-  std::size_t voxels = 0;  // with a score; decided regions exclude voxels of undecided regions
+  std::size_t voxels = 0;  // with a score; if decided, only voxels that are in no undecided region
   std::size_t reaching_cutoff = 0;   // voxels with score >= cutoff
   std::size_t graspable = 0;         // voxels that are marked graspable and no obstacles
   std::optional<double> mean_score;  // nullopt without voxels
@@ -68,7 +68,7 @@ struct ExpectedMapResult {
   Confusion voxels_by_score;
   std::optional<Confusion> voxels_by_flag;  // nullopt if the map has no field "graspable"
   Confusion region_confusion;               // decided regions, by RegionResult::predicted()
-  std::optional<AreaUnderCurve> auc;        // of voxel scores; nullopt unless both classes exist
+  std::optional<AreaUnderCurve> auc;        // of voxel scores; nullopt unless both labels occur
 };
 
 // Returns sensitivity + specificity - 1 (Youden 1950); nullopt without positives or negatives.

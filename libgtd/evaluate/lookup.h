@@ -18,7 +18,7 @@ namespace libgtd {
 
 // Map points that determine the values at a location. nearest: the closest point. maximum: the
 // point with the largest score within the radius (of equal scores, the closest). mean: all points
-// within the radius, with the mean of each field. Of equal points, the first in the map is used.
+// within the radius, with the mean of each field. Of equally good points, the first one is used.
 enum class LookupMode { nearest, maximum, mean };
 std::vector<std::pair<std::string, LookupMode>> lookup_mode_names();
 

@@ -19,11 +19,11 @@ struct ValueBins {
 
   double low(std::size_t bin) const { return first_edge + static_cast<double>(bin) * width; }
   double high(std::size_t bin) const { return first_edge + static_cast<double>(bin + 1) * width; }
-  // Returns the bin with low <= value < high; values beyond belong to the end bins.
+  // Returns the bin with low <= value < high; the first or last bin for values outside.
   std::size_t bin_of(double value) const;
 };
 
-// Returns bins from the one that contains `low` to the one that contains `high` or ends at it.
+// Returns bins from the bin with `low` to the bin that contains `high` or ends at `high`.
 // Throws Error naming `field` for a width <= 0 and for more than 100,000 bins.
 ValueBins bins_over(double low, double high, double width, const char* field);
 
@@ -34,7 +34,7 @@ struct MapAnalysisOptions {
   double score_bin = 0.05;  // widths of the bins of score, height and slope
   double height_bin_m = 0.05;
   double slope_bin_deg = 5.0;
-  bool border = false;  // voxels at the border of the scanned area are evaluated, too
+  bool border = false;  // true: voxels at the border of the scanned area are evaluated, too
 };
 void bind(libmap::ParameterTable& table, MapAnalysisOptions& options);
 
@@ -80,10 +80,10 @@ struct MapAnalysis {
   double plan_area_m2 = 0.0;
   double graspable_plan_area_m2 = 0.0;
   GroundBin ground;  // all evaluated voxels; low, high: range of heights
-  // Ratio occupied / (occupied + empty) columns of the whole map, in which only gaps of at most six
-  // columns along y count as empty. Below 1 if the cloud has fewer points than columns.
+  // Occupied columns / (occupied + empty columns) of the whole map. Empty columns are counted only
+  // in gaps of at most six columns along y. Below 1 if points are too sparse for the columns.
   double column_coverage = 1.0;
-  std::vector<ScoreBin> score_classes;  // classes of the map's legend, best (unbounded) first
+  std::vector<ScoreBin> score_classes;  // classes of the map's legend, best first (high: infinity)
   std::vector<ScoreBin> score_bins;     // from min(0, lowest score) to max(1, highest)
   std::vector<GroundBin> by_height;     // heights in the terrain frame
   std::vector<GroundBin> by_slope;      // from 0 to 90 degrees

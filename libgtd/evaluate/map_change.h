@@ -22,12 +22,12 @@ struct MapChangeOptions {
   double match_distance_voxels = 0.87;
   double height_bin_m = 0.05;
   double slope_bin_deg = 5.0;
-  bool border = false;  // voxels at the border of the scanned area are evaluated, too
+  bool border = false;  // true: voxels at the border of the scanned area are evaluated, too
 };
 // Binds match_distance_voxels; MapAnalysisOptions binds the keys of the other fields.
 void bind(libmap::ParameterTable& table, MapChangeOptions& options);
 
-// Correspondence of voxels. lattice: same indices, one lattice. nearest: mutual nearest voxels.
+// Correspondence of voxels. lattice: same indices on a common lattice. nearest: mutually nearest.
 enum class VoxelMatching { lattice, nearest };
 std::string_view to_text(VoxelMatching matching);
 
@@ -49,9 +49,9 @@ struct ScoreDifference {
   double mean = 0.0;
   double mean_absolute = 0.0;
   double rms = 0.0;
-  double low_5 = 0.0;   // 5th and 95th percentile, nearest rank from each end
-  double median = 0.0;  // mean of the two middle values of an even number
-  double high_95 = 0.0;
+  double low_5 = 0.0;    // 5th percentile: nearest rank, counted from the smallest value
+  double median = 0.0;   // for an even number of pairs: mean of the two middle values
+  double high_95 = 0.0;  // 95th percentile: nearest rank, counted from the largest value
   double min = 0.0;
   double max = 0.0;
   std::optional<double> correlation;  // Pearson; nullopt if one map is constant
@@ -87,14 +87,14 @@ struct MapChange {
 
 // Compares two maps. `map_terrain_from_other_terrain` transforms OTHER's terrain frame to MAP's.
 // Exchanging the maps transposes the confusion matrices and negates the differences. Throws Error
-// for options out of range, maps without a common voxel and a surface of another size.
+// for options out of range, maps without a common voxel and a surface of a different size than MAP.
 MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const VoxelMap& other,
                        const libmap::Pose& map_terrain_from_other_terrain,
                        const MapChangeOptions& options = {});
 
-// Returns one point per pair (at the voxel of MAP) and per voxel that is only in one map, in the
-// frame of MAP's points. Fields: score_map, score_other, difference (NaN if undefined),
-// graspable_map, graspable_other, evaluated (given `border`), change (ChangeClass).
+// Returns one point per pair (at MAP's voxel) and per voxel in one map only, in the frame of MAP's
+// points, with score_map, score_other, difference (NaN if undefined), graspable_map,
+// graspable_other, evaluated (in each map that has the voxel, with `border`), change (ChangeClass).
 libmap::PointCloud to_cloud(const MapChange& change, const VoxelMap& map, const VoxelMap& other,
                             const libmap::Pose& map_terrain_from_other_terrain, bool border);
 

@@ -16,7 +16,7 @@ namespace libgtd {
 struct MapRegionOptions {
   int adjacency_voxels = 1;  // maximum difference of i, j and k of neighbors; 1: 26 neighbors
   int min_voxels = 1;        // minimum number of voxels of a region
-  bool border = false;       // voxels at the border of the scanned area are evaluated, too
+  bool border = false;       // true: voxels at the border of the scanned area are evaluated, too
 };
 void bind(libmap::ParameterTable& table, MapRegionOptions& options);
 
@@ -64,7 +64,7 @@ struct RegionLink {
 
 // Reachability of a region from the start of the robot.
 struct RegionAccess {
-  std::uint32_t group = 0;  // index of the first region of its group of linked regions
+  std::uint32_t group = 0;  // index of the group of linked regions; groups ascend by first region
   bool reachable = false;
   std::optional<std::size_t> steps;  // minimum number of steps, from the start to a region and
                                      // between regions; nullopt: unreachable

@@ -27,7 +27,7 @@ struct MapSummary {
   std::size_t evaluated = 0;
   std::size_t reaching_cutoff = 0;  // evaluated voxels with score >= graspability_threshold
   std::size_t graspable = 0;        // evaluated voxels that the map marks graspable
-  // Evaluated voxels with SSV (number of occupied voxels in the mask) < TSV; nullopt if unknown.
+  // Evaluated voxels with SSV (occupied voxels in mask) < solid_voxel_threshold; nullopt: unknown.
   std::optional<std::size_t> below_solid_threshold;
   // Scores at summary_quantiles (nearest rank); empty if no voxel was evaluated.
   std::vector<double> scores;

@@ -16,7 +16,7 @@
 namespace libgtd {
 
 struct RocOptions {
-  // Finite, ascending cutoffs of the ROC table and AreaUnderCurve::upper_sum; default: thesis.
+  // Finite, ascending cutoffs (default: thesis) of the ROC table and AreaUnderCurve::upper_sum.
   std::vector<double> cutoffs = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0};
   double rate_cutoff = 0.8;          // cutoff at which the rates are computed
   int bootstrap_replicates = 10000;  // number of bootstrap samples; 0: no interval
@@ -76,11 +76,11 @@ struct AreaUnderCurve {
   // Area under the curve through every distinct score: the Mann-Whitney statistic, ties count 1/2.
   double trapezoid = 0.0;
   // Area of the thesis: sum of (FPR_k - FPR_k+1) * TPR_k over all cutoffs k but the last, with the
-  // false positive rate FPR and the true positive rate TPR. Not less than the trapezoid area over
-  // these cutoffs, nor than `trapezoid` if `upper_sum_width` is 1. Negatives below the first cutoff
-  // or reaching the last do not count.
+  // false positive rate FPR and the true positive rate TPR. At least the trapezoid area over these
+  // cutoffs; at least `trapezoid` if `upper_sum_width` is 1. Omits negatives with a score below the
+  // first cutoff, or at or above the last.
   double upper_sum = 0.0;
-  std::vector<double> upper_sum_terms;  // terms of the sum, one per cutoff
+  std::vector<double> upper_sum_terms;  // terms of the sum, one per cutoff; the last is 0
   double upper_sum_width = 0.0;         // FPR at the first cutoff - FPR at the last
   // Bootstrap interval of `trapezoid` (95 %, percentile), stratified: positives and negatives are
   // resampled separately, so that every replicate has both classes. nullopt without replicates. For
@@ -92,7 +92,7 @@ struct RocResult {
   std::vector<RocPoint> at_cutoffs;  // ascending, as given
   std::vector<RocPoint> at_scores;   // every distinct score, ascending
   RocPoint at_rate_cutoff;
-  std::optional<AreaUnderCurve> auc;  // nullopt unless both classes exist
+  std::optional<AreaUnderCurve> auc;  // nullopt without positives or without negatives
   std::string auc_note;               // reason for a missing area
   // Precision at the highest cutoff with recall >= 1/2; nullopt without positives.
   std::optional<double> precision_at_half_recall;

@@ -51,8 +51,8 @@ std::vector<std::string> default_score_columns(const libmap::Table& table,
 // missing column, a cell that is no label or number, and a table without score columns.
 TableEvaluation evaluate_table(const libmap::Table& table, const TableEvaluationOptions& options);
 
-// Returns one row per score column and cutoff. The column `at` is "cutoff" for given cutoffs, which
-// have terms of the upper sum, or "score" for the distinct scores. Undefined rates are empty cells.
+// Returns one row per score column and cutoff. The column `at` is "cutoff" for a given cutoff, or
+// "score" for a distinct score (then without upper_sum_share). Undefined values are empty cells.
 libmap::Table roc_table(const TableEvaluation& evaluation);
 
 // Returns one row per score column and rate: count, total, value, and the Wilson 95 % interval.

@@ -20,7 +20,7 @@ namespace libgtd {
 struct MapInfo {
   std::optional<VoxelLattice> lattice{};  // in the terrain frame; nullopt: unknown
   libmap::Pose terrain_from_map = libmap::Pose::Identity();        // from the frame of the points
-  double zero_plane_m = -std::numeric_limits<double>::infinity();  // minimum z, terrain frame
+  double zero_plane_m = -std::numeric_limits<double>::infinity();  // minimum terrain z of a target
 };
 
 // Reads a MapInfo from a manifest of `graspmap score`; missing properties keep their defaults.
@@ -31,7 +31,7 @@ MapInfo map_info(const libmap::Manifest& manifest);
 struct VoxelMap {
   VoxelLattice lattice;                                            // in the terrain frame
   libmap::Pose terrain_from_map = libmap::Pose::Identity();        // from the frame of the points
-  double zero_plane_m = -std::numeric_limits<double>::infinity();  // minimum z, terrain frame
+  double zero_plane_m = -std::numeric_limits<double>::infinity();  // minimum terrain z of a target
   std::vector<Voxel> voxels;
   std::vector<float> scores;              // NaN: no score
   std::vector<std::uint8_t> graspable;    // 1: marked graspable, has a score, no obstacle

@@ -25,7 +25,7 @@ struct FingerGeometry {
   double curl_rad = 0.0;        // curl without contact
   double curl_limit_rad = 0.0;  // maximum curl
 
-  // Positions (r, z), m.
+  // Positions (r, z), m; the knuckle connects both links.
   Eigen::Vector2d joint() const { return {joint_radius_m, 0.0}; }
   Eigen::Vector2d knuckle(double proximal_rad) const;
   Eigen::Vector2d tip(double proximal_rad, double curl) const;
@@ -56,12 +56,12 @@ struct FingerClosing {
 };
 
 // Closes a finger that is open and does not touch the profile. The proximal link turns inward, with
-// the distal link at the curl without contact (curl_rad). When the ground stops the proximal link,
-// the distal link curls further, up to curl_limit_rad.
+// the distal link at the curl without contact (curl_rad), until a link touches the ground. If this
+// is the proximal link, the distal link curls further, up to curl_limit_rad.
 FingerClosing close_finger(const FingerGeometry& finger, std::span<const GroundSegment> profile);
 
-// Returns the minimum height of the palm at which the open finger is above the whole profile;
-// nullopt if no part of the profile is below the finger. For `profile`, the palm is at z = 0.
+// Returns the minimum z of the palm (now at z = 0) at which the open finger is above the whole
+// profile; nullopt if no part of the profile is below the finger.
 std::optional<double> open_finger_height(const FingerGeometry& finger,
                                          std::span<const GroundSegment> profile);
 

@@ -30,9 +30,9 @@ struct GraspOptions {
   int poses = 32;      // poses per location
   int draws = 32;      // draws of asperities per pose
   int best_draws = 2;  // draws per pose that are also evaluated with SpineSharing::best
-  // Computes LocationResult::pull_limits_n. No parameter of commands.
+  // true: computes LocationResult::pull_limits_n. Not a parameter in bind().
   bool pull_limits = false;
-  // Ends a test when the verdict is certain (sequential_rounds). No parameter of commands.
+  // true: ends a test when holds() is almost certain (SequentialRound). Not a parameter in bind().
   bool sequential = false;
   std::uint64_t seed = 1;
   double offset_m = 0.005;       // standard deviation of the palm position in x and y
@@ -54,7 +54,7 @@ void bind(libmap::ParameterTable& table, GraspOptions& options);
 // - contact: fewer than two contacts of links or engaged spines.
 // - engagement: in some direction, the contacts balance no pull at all.
 // - load: in some direction, the contacts balance a smaller pull than the load.
-// - unseen: any other failure if too much ground below a finger is unseen (max_unseen).
+// - unseen: instead of contact, engagement or load if a finger exceeds ClosingOptions::max_unseen.
 enum class TrialOutcome { holds, approach, contact, engagement, load, unseen };
 const std::vector<std::pair<std::string, TrialOutcome>>& trial_outcome_names();
 
@@ -81,7 +81,7 @@ struct LocationResult {
   // Most frequent direction of minimum force (trials with a force); index in pull_directions().
   std::size_t limiting_direction = 0;
   bool has_force = false;                 // at least one trial has a force
-  std::array<double, 2> force_range_n{};  // the same force: quantiles 0.05, 0.95
+  std::array<double, 2> force_range_n{};  // holding force (equal sharing): quantiles 0.05, 0.95
   // Standard deviations of ln(force) over trials with a force (analysis of variance): between
   // trials of one parameter set, and between the sets.
   double trial_spread = 0.0;

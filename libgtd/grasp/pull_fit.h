@@ -23,7 +23,7 @@ struct PullTest {
   bool on_level_ground = false;                        // true: the location is not used
   double tilt_deg = 0.0;
   double azimuth_deg = 0.0;
-  std::optional<double> force_n;  // force at which the gripper slipped; nullopt: `held`
+  std::optional<double> force_n;  // force at which the gripper slipped; nullopt: use load_n, held
   double load_n = 0.0;            // applied load if there is no force_n
   bool held = false;              // verdict: the gripper held load_n
 };
@@ -39,7 +39,7 @@ struct PullFitOptions {
   double force_noise = 0.15;       // standard deviation of the logarithm of a measured force
   double outlier_fraction = 0.05;  // prior fraction of uninformative tests
   int sets = 256;                  // number of parameter sets per round
-  int rounds = 8;                  // maximum; ends from 3 on if effective_sets >= sets / 4
+  int rounds = 8;                  // maximum; from round 3, ends if effective_sets >= sets / 4
 };
 
 // Median and 90 % interval of a holding force.
@@ -93,8 +93,8 @@ struct PlannedPull {
   double information_bits = 0.0;  // expected entropy reduction of the sets' weights
 };
 
-// Returns at most `count` pulls (tilt 0 or 45 degrees) with the most information, in descending
-// order, at most one per candidate (mesh frame, m) with contact. Throws Error without `fingers`.
+// Returns at most `count` pulls (tilt 0 or 45 degrees) with the most information (descending), at
+// most one per candidate (mesh frame, m) with contact. Throws Error as require_fingers does.
 std::vector<PlannedPull> plan_pulls(const Ground& ground, const Gripper& gripper,
                                     const std::vector<Eigen::Vector3d>& candidates,
                                     std::size_t count, const PullFitOptions& options,

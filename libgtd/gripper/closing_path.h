@@ -20,7 +20,7 @@ namespace libgtd {
 struct FingerPulls {
   std::size_t sets = 0;
   std::vector<float> pulls;             // index: (g + 90) * sets + set; see at()
-  std::vector<float> max_spine_forces;  // per set: mean total limit of the engaged spines
+  std::vector<float> max_spine_forces;  // per set: L * mean number of engaged spines
   std::vector<float> level_spreads;  // per set: standard deviation / mean of a pull on level ground
   std::vector<double> total_closing_forces_n;  // per set: closing force of all fingers, N
 
@@ -37,9 +37,9 @@ FingerPulls finger_pulls(const Gripper& gripper, const std::vector<ParameterSet>
 // half a voxel. Each step has three positions: tip, middle of the distal link, knuckle.
 struct ClosingPath {
   struct PathPoint {
-    double radius_m = 0.0;  // distance from the palm's axis
-    double depth_m = 0.0;   // depth below the palm
-    bool has_spines = false;
+    double radius_m = 0.0;    // distance from the palm's axis
+    double depth_m = 0.0;     // depth below the palm
+    bool has_spines = false;  // true on the distal link
   };
   std::vector<PathPoint> closing;
   std::vector<PathPoint> open;  // the open finger, from joint to tip

@@ -17,7 +17,7 @@ namespace libgtd {
 struct GripperFingers {
   int count = 0;                     // number of fingers, evenly around the palm's axis
   double curl_deg = 0.0;             // inward angle from proximal to distal link without contact
-  double curl_limit_deg = 0.0;       // maximum of this angle after the proximal link has stopped
+  double curl_limit_deg = 0.0;       // maximum inward angle if the ground stops the proximal link
   int spines_per_finger = 0;         // number of spines on the outer half of the distal link
   double spine_tip_radius_um = 0.0;  // radius of the rounded tip
   double spine_force_limit_n = 0.0;  // maximum force on one spine or the asperity below it

@@ -36,7 +36,7 @@ struct GripperMaskOptions {
 // Mask of side x side x layers voxels. z = 0 is the lowest layer, farthest from the palm; layers
 // with z >= solid_layers are the extra void layers on top. Pivot: (pivot_xy, pivot_xy, pivot_z).
 struct GripperMask {
-  Method method = Method::corrected;           // mask layout; `corrected` also if calibrated
+  Method method = Method::corrected;           // mask layout: `corrected` for Method::calibrated
   std::shared_ptr<const ClosingPath> closing;  // set for Method::calibrated, else null
   double closed_radius_m = 0.0;  // corrected only: radius of the circle of closed spines
   double open_radius_m = 0.0;    // corrected only: radius of the circle of open fingers
@@ -67,8 +67,8 @@ struct GripperMask {
 // sizes that give fewer than two solid layers, a side below 3 voxels or more than 2^28 voxels.
 GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& options);
 
-// Returns the mask as text: comment, "side side layers", then for each layer, from the lowest, "z
-// N" and `side` lines (x) of `side` characters (y), '1' for solid.
+// Returns the mask as text: comment, "side side layers", then for each layer N, from 0, "z N",
+// then `side` lines (x) of `side` characters (y), '1' for solid.
 std::string to_text(const GripperMask& mask);
 
 // Returns a point at the center of each solid voxel in meters, pivot at the origin, z toward the

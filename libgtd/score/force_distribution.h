@@ -1,6 +1,6 @@
 // Predicts the distribution of a gripper's holding force at a voxel over trials and parameter sets,
-// from the capacities of the columns near the voxel on which the gripper may rest. Capacity: force
-// of the gripper at rest, divided by the closing force of all fingers. Private to libgtd/score.
+// from capacities of resting columns (near the voxel; the gripper may rest on each). Capacity:
+// holding force on the column / closing force of all fingers. Private to libgtd/score.
 #pragma once
 
 #include <algorithm>
@@ -13,20 +13,20 @@
 
 namespace libgtd {
 
-// Limits the capacities C of a column, one per parameter set, smoothly to the capacity of a lateral
-// pull. Writes ln C to `logs`, or 0 if C is too small for a force.
+// Replaces the capacities C of a column, one per parameter set, by C / sqrt(1 + (C / 0.55)^2),
+// which is below 0.55. Writes ln C to `logs`, or 0 for C <= 0.0005 (no force).
 void bound_capacities(float* capacities, float* logs, std::size_t sets);
 
-// Sums over the resting columns of a voxel, each column with its weight.
+// Weighted sums over the resting columns of a voxel.
 struct RestSums {
-  double contact = 0.0;  // fraction of azimuths with spine contact, on the weakest side
+  double contact = 0.0;  // fraction of azimuths with spine contact, on the side with the fewest
   double rise_m = 0.0;   // height of the palm above the voxel
   double tilt_m = 0.0;   // norm of the mean of (depth times outward direction) of contacts
   double weights = 0.0;  // sum of the weights, > 0
 };
 
 // Weighted sums over the columns, one per parameter set. capacities: sum of C. weights, logs,
-// squares: sums of 1, ln C and (ln C)^2 over the columns in which C is not too small.
+// squares: sums of 1, ln C and (ln C)^2 over the columns with C > 0.0005.
 struct SetSums {
   std::vector<float> weights, logs, squares, capacities;
 
@@ -37,8 +37,8 @@ struct SetSums {
   }
 };
 
-// Distribution of the force F per parameter set: F > 0 with `probability`; ln F is then beta(4, 2)
-// distributed with mean log_force and standard deviation `spread` = 0.178 / scale.
+// Distribution of the force F per parameter set: F > 0 with `probability`. ln F then has the mean
+// log_force and standard deviation `spread`; scale * ln F + constant is beta(4, 2) distributed.
 struct SetForces {
   std::vector<float> probability, log_force, spread, scale;
 };

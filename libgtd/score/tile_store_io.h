@@ -66,7 +66,7 @@ class MapTileStore : public libmap::TileStore {
   std::optional<TilePlan> plan() const;
   void set_plan(const TilePlan& plan) const;
 
-  // Returns the finished tiles of all shares.
+  // Returns the finished tiles, also of other runs that share the tiles of the plan.
   std::map<TileNumber, StoredTile> done(const TilePlan& plan) const;
   // Returns the elements of `tiles` that are not finished or have a changed or missing file.
   std::vector<TileNumber> missing(const TilePlan& plan, const std::vector<TileNumber>& tiles) const;

@@ -41,11 +41,11 @@ class TiltedTerrain {
   std::vector<VoxelCounts> match(const std::vector<TiltedPivot>& pivots,
                                  libmap::Progress& progress = libmap::no_progress()) const;
 
-  // Returns 1 for each pivot with a mask that extends beyond the scanned area, else 0. A pivot has
-  // 1 if a position of the mask's square on the tangent plane
-  // - is in an unscanned column (scanned_area.h), and
-  // - has no points on the line through it along the axis of the mask. The line is as long as the
-  //   square plus closed gaps; gaps between lines with points are closed, too.
+  // Returns 1 for each pivot with a mask that extends beyond the scanned area, else 0. The mask's
+  // footprint is a square of tilted voxels on the tangent plane. A pivot has 1 if one of these
+  // - is in an unscanned column of the terrain (scanned_area.h), and
+  // - is in a tilted column (along the mask's axis) without points, outside closed gaps between
+  //   tilted columns with points. A tilted column is 4 scan_gap_voxels longer than the square.
   // Empty space beside a rock is therefore no border. `unscanned` must contain the columns within
   // tilted_reach_voxels.
   std::vector<std::uint8_t> find_border_pivots(const std::vector<TiltedPivot>& pivots,

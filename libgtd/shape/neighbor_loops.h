@@ -1,7 +1,7 @@
 // Inner loops of the curvature and normal fits over the neighbors of a point, compiled for several
 // instruction sets. Results are identical: sums run in eight lanes for any register width, and are
-// joined in a fixed order. The interface uses plain pointers, so that the loops need no inline
-// functions of other sources, of which the linker could keep the AVX copy for all callers.
+// joined in a fixed order. The interface uses plain pointers only: the linker could use an
+// inline function that is compiled here for AVX in the whole program.
 #pragma once
 
 #include <cstddef>

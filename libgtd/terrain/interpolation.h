@@ -19,7 +19,7 @@ struct InterpolationOptions {
   // Maximum edge length of a triangle in the x-y plane; 0: no limit. Edges are not measured in 3D,
   // because cliffs have long edges even between dense points.
   double max_edge_m = 0;
-  // Spacing of the nodes for `corrected`; 0: from eq. 3-5. All tiles of a terrain need the same.
+  // Spacing of the nodes for `corrected`; 0: from eq. 3-5. Must be the same for all tiles.
   double grid_spacing_m = 0;
   // Maximum spacing for `corrected`; 0: no limit. Rows of voxels remain empty if the spacing
   // exceeds the voxel size.
@@ -43,7 +43,7 @@ struct InterpolationResult {
   std::size_t nodes = 0;               // grid nodes
   std::size_t outside_nodes = 0;   // dropped nodes outside the hull or inside rejected triangles
   std::size_t zero_nodes = 0;      // nodes that `thesis` dropped: height exactly 0
-  std::size_t skipped_points = 0;  // points not finite, or below one of the same x and y
+  std::size_t skipped_points = 0;  // not finite, or below a point with the same x and y
 };
 
 // Interpolates `cloud`, which is in the terrain frame (z up, meters). Throws Error for an option

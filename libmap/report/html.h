@@ -15,7 +15,7 @@ namespace libmap {
 std::string breakable_html(std::string_view name);
 // Escapes JSON for a <script> element: every '<' becomes \u003c.
 std::string escape_json_in_script(std::string json);
-// Escapes "</script", "</style" and "<!--" in a script or style sheet for its element. Removes
+// Escapes "</script", "</style" and "<!--" in an embedded script or style sheet. Removes
 // carriage returns, so that a browser hashes the same bytes as csp_hash.
 std::string escape_code(std::string_view code);
 // Encodes bytes in base64 (RFC 4648, section 4). Throws Error for 1 GiB or more.

@@ -69,7 +69,7 @@ struct MapView {
 
 struct MapViewOptions {
   int voxels_per_cell = 1;               // voxels per cell along one axis
-  std::optional<double> zero_plane_m{};  // points with z below this have below_plane_class
+  std::optional<double> zero_plane_m{};  // lower points have below_plane_class; nullopt: none
   std::optional<double> load_n{};        // nullopt: forces are not shown
   std::optional<MapLattice> lattice{};   // nullopt: estimated from the points
 };

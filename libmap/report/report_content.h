@@ -57,7 +57,7 @@ struct ReportParameters {
 struct TimingRow {
   std::string command;
   std::string step;
-  std::vector<std::optional<double>> seconds;  // one per case; nullopt: not executed
+  std::vector<std::optional<double>> seconds;  // one per case of TimingTable; nullopt: not executed
 };
 
 struct TimingTable {

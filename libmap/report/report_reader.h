@@ -43,7 +43,7 @@ struct PlannedSection {
 PlannedSection plan_report(const std::filesystem::path& folder);
 
 // Returns the outputs that have a manifest, in `folder` and its subfolders (12 levels), in natural
-// order. Folders of tiles are included only if `tiles` is true, tile stores never.
+// order. Folders named "tiles" are searched only if `tiles` is true, tile stores (*.tiles) never.
 std::vector<ReportSource> manifests_below(const std::filesystem::path& folder, bool tiles);
 
 // True if `a` is before `b` in natural order, which compares digits as numbers: "2_a" < "10_b".

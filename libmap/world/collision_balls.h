@@ -18,9 +18,9 @@ struct CollisionBallOptions {
   double max_deviation_m = 0.002;  // > 0: maximum distance between surface and balls
 };
 
-// Covers the triangles of `mesh` whose entry in `marks` is true. Returns balls inside the solid
-// with the surface `body`, by triangle. The triangles are within max_deviation_m of the balls, and
-// no ball extends more than max_deviation_m out of the solid. Triangles without area get no balls.
+// Returns balls that cover the triangles of `mesh` whose entry in `marks` is true, in the order of
+// the triangles, which are within max_deviation_m of the balls. No ball extends more than
+// max_deviation_m out of the solid with the surface `body`. Triangles without area get no balls.
 // Coordinates and radii are multiples of 10 micrometers.
 std::vector<CollisionBall> cover_with_balls(const TriangleMesh& mesh,
                                             const std::vector<bool>& marks,

@@ -71,7 +71,7 @@ struct WorldVisual {
 struct WorldModel {
   std::string name;
   std::vector<WorldVisual> visuals;  // the surface, then the squares of a map's scores
-  HeightField field;                 // is_missing is empty
+  HeightField field;                 // is_missing is empty; balls replace missing cells
   std::vector<CollisionBall> balls;  // balls that replace cells of the field
 };
 
