@@ -23,7 +23,7 @@ struct CalibrationBounds {
   double frame_time_s = 0.033;                  // > 0: maximum depth delay and rolling shutter time
   double max_depth_correction_m = 0.01;         // >= 0: maximum depth correction: constant term
   double max_depth_correction_of_range = 0.02;  // >= 0: term proportional to range, m/m
-  double deviations = 4.0;  // of other parameters, in standard deviations of the prior; no option
+  double deviations = 4.0;  // > 0: maximum of other parameters, in prior deviations; no option
 };
 
 struct BundleAdjustmentOptions {
@@ -68,7 +68,7 @@ inline constexpr double registration_prior_m = 0.02;
 
 struct BundleAdjustmentResult {
   std::map<int, Pose> map_from_base;
-  std::vector<Eigen::Vector3d> points;  // map frame, one per track; 0 with fewer than two poses
+  std::vector<Eigen::Vector3d> points;  // map frame, one per track; 0 if observed from < 2 poses
   SensorCalibration calibration;        // estimated parameters; empty without any
   // Each alternative differs from `calibration` by one standard deviation, in one of the
   // independent directions in parameter space that change the poses' positions most.
