@@ -33,7 +33,7 @@ struct CameraTiming {
 struct SensorCalibration {
   std::vector<IntrinsicsStep> intrinsics{};
   std::vector<DepthCorrection> depth{};
-  std::vector<Pose> color_from_depth{};  // true pose of the depth camera in its stored frame
+  std::vector<Pose> color_from_depth{};  // true pose of depth camera relative to its stored pose
   std::vector<CameraTiming> timing{};
   // Used only with `timing`: velocity of the base by node, in the base frame, m/s and rad/s.
   std::map<int, Vector6d> motion{};
