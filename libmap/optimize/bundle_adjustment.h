@@ -60,8 +60,8 @@ void bind(ParameterTable& table, BundleAdjustmentOptions& options);
 std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
                                           const BundleAdjustmentOptions& options);
 
-// Standard deviation of the prior that the mean relative depth correction of a camera's features is
-// 0. Images and depth do not reveal a depth scale error, so the depth camera sets the scale.
+// Standard deviation of a prior (mean 0) of the relative depth correction averaged over a camera's
+// features. Images and depth do not reveal a depth scale error, so the depth camera sets the scale.
 inline constexpr double depth_gauge = 1e-6;
 // Standard deviation of the prior of a registration's shift, m.
 inline constexpr double registration_prior_m = 0.02;

@@ -40,7 +40,7 @@ struct IcpResult {
   std::map<int, Pose> map_from_base;
   // Information matrix of prior and surfaces, by pose, divided by deviation_scale^2.
   BlockSystem information{0};
-  double deviation_scale = 1.0;  // >= 1: ratio of the poses' errors to errors by independent noise
+  double deviation_scale = 1.0;  // >= 1: pose errors divided by those expected of independent noise
   std::size_t pairs = 0;         // number of aligned pairs
   std::size_t samples = 0;       // matched samples in the last iteration
   std::size_t degenerate_directions = 0;  // number of ignored directions of all pairs
