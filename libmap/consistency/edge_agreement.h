@@ -21,16 +21,16 @@ struct EdgeAgreement {
   // used to estimate the alternative.
   double significance = 0.0;
   double displacement_px = 0.0;  // RMS displacement of edges by the alternative, depth pixels
-  double uncertainty_px = 0.0;   // RMS distance of edges by alternatives from two halves of frames
+  double uncertainty_px = 0.0;   // RMS edge distance between alternatives from even and odd frames
   double min_displacement_px = 0.0;          // a smaller displacement_px means agreement
-  Pose color_from_depth = Pose::Identity();  // pose of the alternative; no shift along z
+  Pose color_from_depth = Pose::Identity();  // pose of the alternative; z is 0
   double focal_factor = 1.0;  // focal length of the alternative, relative to the stored one
 
-  // True if displacement_px is significant and exceeds min_displacement_px and 4 uncertainty_px.
+  // True if significance > 3, and displacement_px > min_displacement_px and > 4 * uncertainty_px.
   bool is_displaced() const;
   // True if is_displaced() and focal_factor differs from 1 by more than 0.03.
   bool is_scaled() const;
-  // Returns a sentence on the displacement, for messages; empty if the images agree.
+  // Returns a sentence on the displacement, for messages; empty if not is_displaced().
   std::string sentence() const;
 };
 

@@ -27,7 +27,7 @@ struct PoseConsistency {
   DepthAgreement best{};
   std::string convention{};
 
-  // Returns one sentence; empty if the frames agree or have too few common measurements.
+  // Returns one sentence; without `convention`, empty if contradicted < 0.5 or measurements < 500.
   std::string warning() const;
 };
 
@@ -36,7 +36,7 @@ struct PoseConsistency {
 std::vector<std::pair<std::size_t, std::size_t>> near_pairs_of(const Trajectory& poses);
 
 // Compares the frames of near_pairs_of(world_from_base); unreadable frames are ignored. If 20 % of
-// the measurements or more contradict, these conventions are tried:
+// the measurements or more contradict the given poses, these conventions are tried:
 //   - quaternions as w x y z
 //   - poses of the base, the camera's optical frame, or a camera with y up; inverse poses
 //   - positions in other axes than the rotations; depth unit 5 or 1000 times larger or smaller

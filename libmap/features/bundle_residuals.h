@@ -26,16 +26,16 @@ struct CalibratedObservation {
   bool registration = false;               // pose of the depth camera relative to the color camera
   bool timing = false;                     // CameraTiming
   DepthCorrection::Terms terms{};          // basis values of the depth correction at the feature
-  bool has_depth = true;                   // false: the depth was measured on another surface
+  bool has_depth = true;                   // false: depth unknown (RegisteredDepth::known)
   double added_m = 0.0;                    // change of depth by the known registration and timing
   Vector6d by_step = Vector6d::Zero();     // derivative of the depth by a registration step
-  Vector6d known_step = Vector6d::Zero();  // registration step that the known timing causes
+  Vector6d known_step = Vector6d::Zero();  // registration step due to known timing and motion
   double image_row_fraction = 0.0;         // row_fraction() of the feature (frame_calibration.h)
   double depth_stamp_offset_s = 0.0;       // FrameFeatures::depth_stamp_offset_s
 };
 
-// First index of each kind of parameter of a camera: step of the intrinsics (4), step of the
-// registration (6), timing (2), radial terms (3) and spline coefficients of the depth correction.
+// First index of each kind of a camera's parameters: 4 for a step of intrinsics, 6 for a step of
+// registration, 2 for timing; for the depth correction, 3 radial terms, then spline coefficients.
 inline constexpr Eigen::Index intrinsics_at = 0;
 inline constexpr Eigen::Index registration_at = 4;
 inline constexpr Eigen::Index timing_at = 10;
@@ -49,7 +49,7 @@ struct CalibratedResidual {
   Eigen::Matrix<double, 3, 6> by_motion;  // by the base's velocity; set only if timing is estimated
   Eigen::Matrix3d by_point;               // by the point in the map frame
   Eigen::Matrix<double, 3, spline_at> by_camera;  // by the parameters before spline_at; 0 if known
-  Eigen::RowVector4d depth_by_spline;  // depth by four parameters from spline_at + terms.first on
+  Eigen::RowVector4d depth_by_spline;  // depth by the 4 parameters from spline_at + terms.first on
 };
 
 // One observation of a point. The parameters of the intrinsics are steps from the intrinsics that

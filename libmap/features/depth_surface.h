@@ -38,8 +38,8 @@ class DepthSurface {
   };
 
   DepthSurface() = default;
-  // Takes every step_px-th pixel of `planes`. Drops planes that were fitted to few pixels, for
-  // example at edges: less than a quarter of the maximum. surface_noise_m: as in FeatureOptions.
+  // Takes every step_px-th pixel of `planes`. Drops planes (e.g. at edges) whose `support` is
+  // less than a quarter of the image's largest. surface_noise_m: as in FeatureOptions.
   DepthSurface(const DepthPlanes& planes, const Camera& depth_camera, const DepthNoise& noise,
                double surface_noise_m, int step_px);
   // Restores a stored surface. Throws Error if the number of cells differs from columns() * rows().
@@ -56,8 +56,8 @@ class DepthSurface {
   const std::vector<Cell>& cells() const { return cells_; }
   int columns() const { return columns_; }
   int rows() const { return rows_; }
-  // Looks up a grid position, which must be inside the grid. This function and the next two set
-  // `element` (optical frame), or return false without a measurement at the point's pixel.
+  // Looks up a position, which must be inside the grid. at, nearest_to and interpolated_at set
+  // `element` (optical frame), or return false if there is no measurement.
   bool at(int column, int row, SurfacePatch& element) const;
   // Looks up the grid position nearest to the projection of `point_in_camera` (optical frame).
   bool nearest_to(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;

@@ -29,7 +29,7 @@ struct FeatureLink {
   FramePair frames;
   PoseLink link{};                       // between the nodes of the frames
   std::vector<FeatureMatch> matches{};   // inliers; a is in frames.first, b in frames.second
-  std::vector<FeatureMatch> held_out{};  // consistent matches that the estimate did not use
+  std::vector<FeatureMatch> held_out{};  // held-out matches with chi-square <= 4 * max_chi_square
   double chi_square_per_freedom = 0.0;   // chi-square of the inliers per degree of freedom
 };
 
@@ -41,7 +41,7 @@ struct RejectionCounts {
   std::size_t degenerate = 0;  // inliers in one spot or on one line of the image
   std::size_t not_converged = 0;
   std::size_t against_graph = 0;  // not consistent with the pose graph's estimate and covariance
-  std::size_t unconfirmed = 0;    // the only link between two components of the pose graph
+  std::size_t unconfirmed = 0;    // no other link between the same two graph components agrees
   std::size_t accepted = 0;
 };
 

@@ -33,7 +33,7 @@ struct CameraTiming {
 struct SensorCalibration {
   std::vector<IntrinsicsStep> intrinsics{};
   std::vector<DepthCorrection> depth{};
-  std::vector<Pose> color_from_depth{};  // pose of the true relative to the stored depth camera
+  std::vector<Pose> color_from_depth{};  // true pose of depth camera relative to its stored pose
   std::vector<CameraTiming> timing{};
   // Used only with `timing`: velocity of the base by node, in the base frame, m/s and rad/s.
   std::map<int, Vector6d> motion{};
@@ -61,7 +61,7 @@ double squared_radius_of(const Feature& feature, const Camera& camera);
 // is exposed f * CameraTiming::rolling_shutter_s after the middle row.
 double row_fraction(const Feature& feature, const Camera& camera);
 
-// Converts the velocity of the base (base frame, m/s and rad/s) to the camera's (optical frame).
+// Converts a velocity of the base (base frame, m/s, rad/s) to that of the camera (optical frame).
 Vector6d motion_in_camera(const Camera& camera, const Vector6d& base_motion);
 // Returns the depth camera's pose relative to the color camera at the exposure of the feature.
 Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
@@ -70,7 +70,7 @@ Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
 // Change of a feature's depth if the depth camera is at `color_from_depth` instead of its stored
 // pose relative to the color camera.
 struct RegisteredDepth {
-  bool known = false;    // false, and values 0: the depth was measured on another surface
+  bool known = false;    // false, and values 0: no depth plane is on the ray of the feature
   double added_m = 0.0;  // change of the depth
   // Derivative of the depth by s in moved(Pose::Identity(), s) * color_from_depth (rigid_motion.h).
   Vector6d by_step = Vector6d::Zero();

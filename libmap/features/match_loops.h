@@ -26,8 +26,8 @@ struct MatchLoops {
     float* first_of_a;   // largest scalar product of the descriptor of a with descriptors of b
     float* second_of_a;  // second largest scalar product
     int* nearest_of_a;   // index in b of the largest scalar product
-    float* first_of_b;   // largest scalar product with descriptors of a; -2 before the call
-    int* nearest_of_b;   // index in a of this product; -1 before the call
+    float* first_of_b;   // largest scalar product with descriptors of a; set to -2 before the call
+    int* nearest_of_b;   // index in a of this product; set to -1 before the call
   };
   void (*find_nearest)(const Input& input, const Output& output);
 };

@@ -23,8 +23,8 @@ struct SimilarFrame {
 
 // Returns for each frame the `count` most similar other frames, best first. `parts` may contain for
 // each frame the number of its part of the scan (a connected component of the pose graph); then the
-// `count` most similar frames of other parts follow. Frames without a common word are never
-// returned. `seed` selects the training samples. Throws Error if a descriptor file cannot be read.
+// `count` most similar frames of other parts follow (maybe repeated). Frames without a common word
+// are never returned. `seed` selects training samples. Throws Error if it cannot read descriptors.
 std::vector<std::vector<SimilarFrame>> find_similar_frames(
     const std::vector<FrameFeatures>& frames, std::size_t count,
     const PlaceRecognitionOptions& options, std::uint64_t seed,

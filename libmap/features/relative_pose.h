@@ -60,7 +60,7 @@ struct RelativePose {
   // Jacobian J and the weights W of the inliers' residuals.
   Matrix6d information = Matrix6d::Zero();
   double chi_square_per_freedom = 0.0;  // chi-square of the inliers per degree of freedom
-  double spread = 0.0;  // twice the deviation of the inliers' unit rays along the narrower axis
+  double spread = 0.0;  // twice the standard deviation of inliers' unit rays along the minor axis
   std::vector<FeatureMatch> inliers;
 };
 

@@ -16,7 +16,7 @@ struct PlacedElement {
   double range_m = 0.0;                              // depth along the optical axis
 };
 
-// One in ten patches (6 x 6 grid cells) of each depth image is only for checks, not for estimation.
+// One in ten blocks of 6 x 6 grid cells of a depth image is only for checks, not for estimation.
 enum class SampleUse { estimation, checks };
 
 // Returns about `count` planes, evenly distributed over the frame's images.

@@ -2,7 +2,7 @@
 // 1. frame_registration moves frames so that the surfaces agree in random blocks of the x-y plane.
 // 2. First pass over the frames: depth_planes fits a plane to the pixels around each pixel, and
 //    surface_voxels averages positions and normals in a hashed voxel grid. The result is a coarse
-//    surface of surface elements (points with normals), one per column of voxels and surface.
+//    surface of surface elements (points with normals): in each column of voxels, one per surface.
 // 3. Second pass: surface_refinement moves each element along its normal to the weighted mean of
 //    the measurements of all frames within a disc around the element.
 // 4. surface_points converts the elements to a cloud.

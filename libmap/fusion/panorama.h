@@ -20,7 +20,7 @@ struct PanoramaView {
   int index = 0;       // value of the field `camera`
   Camera camera{};     // same size as `depth`; base_from_camera is robot_from_camera
   DepthImage depth{};
-  double near_m = 0.0;  // m; z outside near_m to far_m is dropped
+  double near_m = 0.0;  // pixels with z outside near_m to far_m are dropped
   double far_m = std::numeric_limits<double>::infinity();
 };
 

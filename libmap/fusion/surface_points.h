@@ -33,7 +33,7 @@ struct SurfacePointCounts {
   std::size_t missed = 0;           // dropped: views measured nothing at the points
   std::size_t contradicted = 0;     // dropped: measured by one or two frames, in or beside a block
                                     // with many contradicted points (contradiction_block)
-  std::size_t beyond_edge = 0;      // dropped: beyond an edge where the surface bends
+  std::size_t beyond_edge = 0;      // dropped: extended points that refinement moved too far
   std::size_t merged = 0;           // merged with another point of the same or the next voxel
   std::size_t extended_points = 0;  // points of the cloud beyond measured edges
 };

@@ -63,9 +63,9 @@ struct RefinedSurface {
 };
 
 // Refines the elements, in meters, with all views. `pose_error_m` >= 0 is the standard deviation of
-// a whole frame along the normal. `each_group(add)` must call add(views) for groups of views until
-// all views were added, in the order of frames. The order of frames affects the result by rounding
-// only; the number of threads does not.
+// a frame's position along the normal. `each_group(add)` must call add(views) for groups of views
+// until all views were added, in the order of frames. The order of frames affects the result by
+// rounding only; the number of threads does not.
 using AddViews = std::function<void(std::span<const RefinementView>)>;
 RefinedSurface refine_surface(std::vector<SurfaceElement> elements, const DepthSensor& sensor,
                               const SurfaceSearch& search, double pose_error_m,

@@ -56,7 +56,7 @@ struct SurfaceElement {
   bool extended = false;                               // one voxel beyond measured voxels
 };
 
-// Returns one element per column of voxels and surface in the column, in voxels. A column is
+// Returns elements (positions in voxels): in each column of voxels, one per surface. A column is
 // parallel to the axis nearest to the normal; its elements are on its center line. If noise spreads
 // a surface over two voxels of a column, the voxel with more weight is used. With `extend`, empty
 // columns beside a surface get an element too. The order is a function of the occupied voxels.

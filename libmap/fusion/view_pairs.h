@@ -8,9 +8,9 @@
 
 namespace libmap {
 
-// One entry per sampled pixel of the first view; NaN if the second view does not show it.
+// One entry per sampled pixel of the first view; NaN: the second view measured nothing there.
 struct ViewComparison {
-  std::vector<Eigen::Vector3f> points;  // in the first camera's frame; 0 without depth
+  std::vector<Eigen::Vector3f> points;  // in the first camera's frame; 0 without depth, never NaN
   std::vector<float> depth;             // (measured - expected depth) / expected depth
   std::vector<float> color;             // 1 - correlation of the brightness of 5 x 5 pixels
 };

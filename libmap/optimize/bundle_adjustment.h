@@ -23,7 +23,7 @@ struct CalibrationBounds {
   double frame_time_s = 0.033;                  // > 0: maximum depth delay and rolling shutter time
   double max_depth_correction_m = 0.01;         // >= 0: maximum depth correction: constant term
   double max_depth_correction_of_range = 0.02;  // >= 0: term proportional to range, m/m
-  double deviations = 4.0;  // of other parameters, in standard deviations of the prior; no option
+  double deviations = 4.0;  // > 0: maximum of other parameters, in prior deviations; no option
 };
 
 struct BundleAdjustmentOptions {
@@ -60,15 +60,15 @@ void bind(ParameterTable& table, BundleAdjustmentOptions& options);
 std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
                                           const BundleAdjustmentOptions& options);
 
-// Standard deviation of the prior that the mean relative depth correction of a camera's features is
-// 0. Images and depth do not reveal a depth scale error, so the depth camera sets the scale.
+// Standard deviation of a prior (mean 0) of the relative depth correction averaged over a camera's
+// features. Images and depth do not reveal a depth scale error, so the depth camera sets the scale.
 inline constexpr double depth_gauge = 1e-6;
 // Standard deviation of the prior of a registration's shift, m.
 inline constexpr double registration_prior_m = 0.02;
 
 struct BundleAdjustmentResult {
   std::map<int, Pose> map_from_base;
-  std::vector<Eigen::Vector3d> points;  // map frame, one per track; 0 with fewer than two poses
+  std::vector<Eigen::Vector3d> points;  // map frame, one per track; 0 if observed from < 2 poses
   SensorCalibration calibration;        // estimated parameters; empty without any
   // Each alternative differs from `calibration` by one standard deviation, in one of the
   // independent directions in parameter space that change the poses' positions most.

@@ -22,13 +22,13 @@ enum class IcpMode { off, links, global };
 struct IcpOptions {
   IcpMode mode = IcpMode::global;
   int iterations = 12;           // >= 1: maximum number of iterations
-  int pairs_per_frame = 8;       // >= 1: for global, frames with the largest overlap per frame
+  int pairs_per_frame = 8;       // >= 1: for global, pairs of each frame, by largest overlap
   double min_overlap = 0.25;     // 0 to 1: for global, minimum overlap as a share of samples
   int samples = 1500;            // >= 1: approximate number of surface samples per frame
   double max_distance_m = 0.03;  // > 0: initial maximum distance between a sample and its plane
   double max_normal_angle_deg = 35.0;  // maximum angle between normals of sample and plane
   double correlation = 4.0;  // >= 1: number of samples that count as one independent sample
-  // 0 to 1: directions are ignored whose eigenvalue is smaller, relative to the largest eigenvalue.
+  // 0 to 1: a pair's directions with a smaller ratio eigenvalue / largest eigenvalue are ignored.
   double max_degenerate_ratio = 0.002;
   // The width of the robust loss decreases slowly, for inaccurate initial poses (graduated
   // non-convexity, Blake and Zisserman 1987). No command option.
@@ -38,9 +38,9 @@ void bind(ParameterTable& table, IcpOptions& options);
 
 struct IcpResult {
   std::map<int, Pose> map_from_base;
-  // Information matrix of prior and surfaces, in the order of the poses, over deviation_scale^2.
+  // Information matrix of prior and surfaces, by pose, divided by deviation_scale^2.
   BlockSystem information{0};
-  double deviation_scale = 1.0;  // >= 1: ratio of the poses' errors to errors by independent noise
+  double deviation_scale = 1.0;  // >= 1: pose errors divided by those expected of independent noise
   std::size_t pairs = 0;         // number of aligned pairs
   std::size_t samples = 0;       // matched samples in the last iteration
   std::size_t degenerate_directions = 0;  // number of ignored directions of all pairs

@@ -10,15 +10,15 @@
 
 namespace libmap {
 
-// Velocity in the base frame (m/s, rad/s). The default standard deviation describes the deviation
-// of a hand-held camera's velocity from the mean between poses a third of a second or more apart.
+// Velocity in the base frame (m/s, rad/s). The default `deviation` is that of a hand-held camera:
+// its velocity at a frame minus its mean velocity between two poses that are 1/3 s or more apart.
 struct KnownMotion {
   Vector6d mean = Vector6d::Zero();
   Vector6d deviation = (Vector6d() << 0.15, 0.15, 0.15, 0.25, 0.25, 0.25).finished();
 };
 
-// Returns the velocity by node, for each frame with a pose. Poses of different components are in
-// different coordinate frames; if `components` is empty, all poses are in one coordinate frame.
+// Returns velocities by node, for each frame with a pose; zero without another pose within 3 s.
+// Poses of different `components` are in different coordinate frames; if empty, all are in one.
 std::map<int, KnownMotion> relative_motions(const std::vector<FrameFeatures>& frames,
                                             const std::map<int, Pose>& poses,
                                             const std::vector<GraphComponent>& components);

@@ -10,8 +10,8 @@
 
 namespace libmap {
 
-// Normal equations of tracks over poses. Observations by frames without a pose are ignored, and
-// tracks with fewer than two other observations.
+// Normal equations of tracks over poses. Observations by frames without a pose are ignored. A
+// track with fewer than two remaining observations is ignored, too.
 class TrackSystem {
  public:
   // Keeps references to `frames` and `tracks`. `robust_scale` is the width of Cauchy's loss.

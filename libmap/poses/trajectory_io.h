@@ -67,8 +67,8 @@ struct NodeTrajectory {
 
 // Assigns poses to nodes: by node id if all poses have one, else by stamp within 20 ms if any pose
 // has a stamp, else by order. The assignment by order requires as many poses as the scan has valid
-// nodes, or valid nodes with an optimized pose. Throws Error (without the file's name) if no pose
-// matches or a node has two poses.
+// nodes (GraphNode::invalid_weight), or valid nodes with an optimized pose; else it throws Error.
+// Throws Error (without the file's name) if no pose matches or a node has two poses.
 NodeTrajectory assign_nodes(const Trajectory& trajectory, const PoseGraph& graph);
 
 }  // namespace libmap

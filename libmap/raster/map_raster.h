@@ -33,7 +33,7 @@ struct RasterBand {
 struct MapRaster {
   std::int64_t columns = 0;
   std::int64_t rows = 0;
-  // Maps (column, row, 1) to x and y in the frame, m; pixel corners are whole numbers.
+  // Maps (column, row, 1) to x and y in RasterGrid's frame, m; pixel corners are whole numbers.
   Eigen::Matrix<double, 2, 3> frame_from_pixel;
   std::vector<double> heights_m;  // z in the frame; NaN: no data
   std::vector<RasterBand> bands;  // bands other than the height

@@ -33,11 +33,11 @@ std::vector<BoardView> find_boards(const ScanSource& scan, const std::vector<Fra
 
 // Estimates pose and size of the board in the map by generalized least squares of the corners'
 // pixels, with the noise of the corners and of the poses. Inputs: `frames` with the stored
-// calibration; `calibration`, which is applied to them; `covariance` by node of a pose step
+// calibration; `calibration`, which is applied to them; `covariance` by node, for a pose step
 // (rigid_motion.h), map units and rad (poses of nodes without an entry are exact). Skips views of
 // nodes without a pose, and views that contradict the others (another board, or a moved one). In
 // the result, `lengths` is the number of used views, and `chi_square` compares the views with the
-// board; above 1, `deviation` is multiplied by sqrt(chi_square). Throws Error if no two images
+// board; if > 1, `deviation` is multiplied by sqrt(chi_square). Throws Error if no two images
 // agree on the board's pose, or if the standard deviation of the scale is above 3 %, e.g. because
 // all views are from one location.
 ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,

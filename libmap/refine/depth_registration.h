@@ -22,7 +22,7 @@ struct CoarseRegistration {
 // result. Throws Error if `may_register` and the stored focal length of depth is wrong.
 CoarseRegistration register_coarsely(const ScanSource& scan, bool may_register);
 
-// Combines the calibration of a registered scan with the coarse registration of all `cameras`.
+// Adds the coarse registration to the `calibration` of a registered scan with `cameras` cameras.
 void add_registration(const Pose& color_from_depth, std::size_t cameras,
                       SensorCalibration& calibration);
 

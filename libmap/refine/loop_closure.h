@@ -36,8 +36,8 @@ std::set<FramePair> consecutive_pairs(const std::vector<FrameFeatures>& frames, 
 std::set<FramePair> similar_pairs(const std::vector<FrameFeatures>& frames,
                                   const std::vector<GraphComponent>& components,
                                   const LoopClosureDetectionOptions& options, std::uint64_t seed);
-// Returns pairs of frames of one component with near poses (radius_m, angle_deg). Ignores frames
-// without a pose.
+// Returns pairs of each frame with up to near_candidates frames of its component: those with the
+// nearest poses within radius_m and angle_deg. Ignores frames without a pose.
 std::set<FramePair> near_pairs(const std::vector<FrameFeatures>& frames,
                                const std::map<int, Pose>& map_from_base,
                                const std::vector<GraphComponent>& components,

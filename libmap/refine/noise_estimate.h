@@ -36,8 +36,8 @@ struct ScanNoise {
 // range, else the assumed noise.
 ScanNoise choose_noise(const std::vector<SurfaceResidual>& residuals, const DepthNoise& assumed);
 
-// Chooses the noise by held-out depth of up to 12 pairs of near frames, which the other depth
-// aligns. Keeps the noise of `planes` if is_noise_given. Ignores frames that cannot be read.
+// Chooses by residuals of held-out depth in up to 12 pairs of near frames, aligned by the rest of
+// their depth. Keeps the noise of `planes` if is_noise_given. Ignores frames that cannot be read.
 ScanNoise choose_noise(const ScanSource& scan, const Trajectory& world_from_base,
                        const std::string& sensor, const DepthPlaneOptions& planes,
                        Progress& progress = no_progress());

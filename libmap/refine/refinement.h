@@ -113,8 +113,8 @@ struct RefinementResult {
 void describe(ResultTable& table, const RefinementResult& result);
 
 // Refines the poses of a scan. With StartPoses::automatic or visual, visual odometry estimates the
-// poses of nodes without an initial pose. Parts of visual odometry without links to the largest
-// part get no poses, because their poses are undetermined. The output bytes do not depend on the
+// poses of nodes without an initial pose. A connected component of only such nodes gets no poses,
+// except the largest one if no node has an initial pose. The output bytes do not depend on the
 // number of threads. Throws Error if an option is out of range, the requested initial poses are
 // missing, the focal length of depth is wrong, or no two frames match and the scan has no links.
 // Also throws Error if two options determine the scale, or the requested source does not.

@@ -34,7 +34,7 @@ struct ScaleEstimate {
   double factor = 1.0;
   double deviation = 0.0;   // standard deviation of the factor
   std::size_t lengths = 0;  // number of measurements used
-  double chi_square = 0.0;  // per degree of freedom, against the factor; 0 for one measurement
+  double chi_square = 0.0;  // of the measurements, per degree of freedom; 0 for one or for odometry
 };
 
 // Checks the ends of known lengths before poses are estimated. Throws Error if an end's node has no
@@ -53,7 +53,7 @@ ScaleEstimate scale_by_lengths(const std::vector<FrameFeatures>& frames,
                                const std::vector<KnownLength>& lengths);
 
 // Estimates the scale from the translations of accepted odometry links (LinkType::neighbor) and
-// their information. Returns nullopt if there is no accepted odometry link.
+// their information. Returns nullopt if these links do not determine a scale.
 std::optional<ScaleEstimate> scale_by_odometry(const std::vector<GraphLinkResult>& links,
                                                const std::map<int, Pose>& map_from_base);
 

@@ -60,7 +60,7 @@ struct CalibrationEstimate {
 };
 
 // Selects a model (set of parts) by bundle adjustments of at most 80 linked frames:
-// 1. Timing alone is the result if all parts together do not fit the held-out data clearly better.
+// 1. Timing alone, if the held-out data fit clearly better and adding all parts is no clear gain.
 // 2. Otherwise, intrinsics, depth corrections and registration are estimated together, because a
 //    false focal length absorbs depth errors; if this is not clearly better, intrinsics alone.
 // 3. A part is dropped if the held-out data do not fit clearly worse without it.

@@ -28,7 +28,7 @@ void bind(ParameterTable& table, VisualOdometryOptions& options);
 struct TrackingStart {
   std::map<int, int> session;           // by node, 0 by default; tracking stops between sessions
   std::map<int, Pose> map_from_base;    // known poses by node, which are not changed
-  std::vector<std::vector<int>> parts;  // disjoint groups, known poses in one coordinate frame
+  std::vector<std::vector<int>> parts;  // disjoint groups of nodes, poses in one coordinate frame
   std::map<int, Pose> first;            // pose of a new part's first node; the identity by default
 
   int session_of(int node) const {
