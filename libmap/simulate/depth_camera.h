@@ -40,7 +40,7 @@ struct SurfaceView {
   Image<Eigen::Vector3f> color;  // 0 to 1; mean of the colors at the center (1/2) and corners (1/8)
 };
 
-// Source of colors. mesh: vertex colors; rock: rock_color(); automatic: rock if colors are equal.
+// Source of colors. mesh: vertex colors; rock: rock_color(); automatic: mesh if its colors differ.
 enum class TextureSource { automatic, mesh, rock };
 
 // Source of the normals for shading: estimated from the mesh, or vertex normals of the mesh.
