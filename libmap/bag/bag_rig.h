@@ -46,7 +46,7 @@ struct BagRigPlan {
   CameraRig rig{};                    // rig to write
   std::vector<std::string> topics{};  // topic of each camera of the rig; empty: no images
   std::vector<BagImage> images{};     // images of the selected sets, ascending by camera and stamp
-  // Selected synchronized sets (rig_io.h); SynchronizedSet::Camera::image is an internal index.
+  // Selected synchronized sets (rig_io.h); SynchronizedSet::Camera::image has no meaning here.
   std::vector<SynchronizedSet> sets{};
   std::size_t sets_in_bag = 0;          // number of synchronized sets, selected or not
   std::vector<std::string> warnings{};  // dropped images and missing stamps, by topic
@@ -70,7 +70,7 @@ std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan);
 
 struct BagRigExport {
   std::size_t images = 0;  // number of written images
-  // Synchronized sets of the written images; SynchronizedSet::Camera::image is an internal index.
+  // Synchronized sets of the written images; SynchronizedSet::Camera::image has no meaning here.
   std::vector<SynchronizedSet> sets{};
   // Number of pixels written as 0 because their depth exceeds 65534 units of the written images.
   std::size_t overflow_pixels = 0;

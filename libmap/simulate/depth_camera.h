@@ -91,7 +91,7 @@ struct DepthSensorOptions {
   double near_m = 0.5;              // minimum measured depth
   double far_m = 4.5;               // maximum measured depth
   double max_incidence_deg = 80.0;  // maximum angle between ray and normal; 90: no limit
-  double edge_gap_m = 0.05;         // a pixel with a larger depth discontinuity is an edge pixel
+  double edge_gap_m = 0.05;         // edge pixel: a larger depth jump, or a corner without depth
   double flying_pixels = 0.35;      // fraction of edge pixels that mix foreground and background
   double edge_dropouts = 0.35;      // fraction of edge pixels without depth
 
