@@ -25,8 +25,8 @@ struct CloudMessage {
 //   - x, y, z: positions; normal_x, normal_y, normal_z or nx, ny, nz: normals.
 //   - rgb or rgba (PCL: 8 bits per channel in one number), r, g, b or red, green, blue: colors.
 //   - all other names: scalar fields NAME, or NAME_0, NAME_1, ... for several numbers per point.
-// Throws Error naming the field if x, y or z is missing, a field is a duplicate, extends beyond the
-// point or has an unknown type, a point has more than 1024 numbers, or rows or data are too short.
+// Throws Error naming the field if x, y or z is missing, or a field is a duplicate, has an unknown
+// type or exceeds the point. Throws Error for over 1024 numbers per point, and short rows or data.
 CloudMessage decode_cloud(MessageEncoding encoding, std::string_view bytes);
 
 struct BagCloudResult {

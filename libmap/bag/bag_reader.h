@@ -52,7 +52,7 @@ bool has_bag_extension(const std::filesystem::path& path);
 // True if the path has the extension of a bag, or is a folder with metadata.yaml, .mcap or .db3.
 bool is_bag_path(const std::filesystem::path& path);
 // Returns the files of a bag: `path` itself or, for a folder, metadata.yaml and the files that it
-// lists. Throws Error if metadata.yaml is missing or invalid, or the bag is compressed.
+// lists. Throws Error if metadata.yaml is missing or invalid, or its files are compressed.
 std::vector<std::filesystem::path> files_of_bag(const std::filesystem::path& path);
 
 // Lists the topics of a bag. Throws Error naming the file if it cannot be read, is not a bag, is
@@ -77,8 +77,8 @@ struct BagMessage {
 void read_bag(const std::filesystem::path& path, const std::vector<BagRequest>& requests,
               const std::function<void(const BagMessage&)>& take);
 
-// Returns the topic `name` of a bag. Throws Error if the topic does not exist (with the nearest
-// name and all topics of `type`), or if its messages have another type or definition.
+// Returns the topic `name` of a bag. Throws Error if there is no such topic, naming the nearest one
+// and all topics of `type`; also if the topic's messages have another type or definition.
 const BagTopic& require_topic(const BagListing& listing, const std::string& name,
                               const MessageType& type);
 

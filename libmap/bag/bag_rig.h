@@ -24,8 +24,8 @@ struct BagRigOptions {
   std::string base_frame = "auto";  // robot frame; auto: base_link, else the root of all transforms
   std::string transform_topic = "/tf_static";  // topic of the static transforms
   double depth_unit_m = 0.001;                 // > 0: meters per unit of 16-bit images in the bag
-  // Meters per unit of the written images; 0: as in `rig`; without `rig`, depth_unit_m, or 0.1 mm
-  // for images in 32FC1.
+  // Meters per unit of the written images; 0: as in `rig`. 0 without `rig`: depth_unit_m for 16-bit
+  // images, 0.1 mm for 32FC1 images.
   double depth_scale_m = 0.0;
   double near_m = 0.0;  // minimum valid depth of the written rig; 0: as in `rig`, if given
   double far_m = std::numeric_limits<double>::infinity();  // maximum; infinity: as in `rig`
@@ -46,7 +46,7 @@ struct BagRigPlan {
   CameraRig rig{};                    // rig to write
   std::vector<std::string> topics{};  // topic of each camera of the rig; empty: no images
   std::vector<BagImage> images{};     // images of the selected sets, ascending by camera and stamp
-  // Selected sets of synchronized images (rig_io.h); do not use their `image`, an internal index.
+  // Selected synchronized sets (rig_io.h); SynchronizedSet::Camera::image has no meaning here.
   std::vector<SynchronizedSet> sets{};
   std::size_t sets_in_bag = 0;          // number of synchronized sets, selected or not
   std::vector<std::string> warnings{};  // dropped images and missing stamps, by topic
@@ -63,18 +63,18 @@ struct BagRigPlan {
 BagRigPlan plan_bag_rig(const std::filesystem::path& bag, const BagRigOptions& options,
                         const std::optional<double>& stamp_s = std::nullopt);
 
-// CSV file with one row per synchronized set: stamp_s, cameras (number), spread_s (first to last).
+// CSV file with one row per synchronized set: stamp_s, cameras (number), spread_s (last - first).
 inline constexpr const char* synchronized_sets_file_name = "synchronized_sets.csv";
 // Names of the entries that export_bag_rig writes: rig.yaml, synchronized_sets.csv, camera folders.
 std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan);
 
 struct BagRigExport {
   std::size_t images = 0;  // number of written images
-  // Synchronized sets of the written images; do not use their `image`, an internal index.
+  // Synchronized sets of the written images; SynchronizedSet::Camera::image has no meaning here.
   std::vector<SynchronizedSet> sets{};
   // Number of pixels written as 0 because their depth exceeds 65534 units of the written images.
   std::size_t overflow_pixels = 0;
-  std::size_t undecodable_images = 0;   // number of unusable images
+  std::size_t undecodable_images = 0;   // unusable images: damaged, or not of the calibrated size
   std::vector<std::string> warnings{};  // reason for the first unusable image of each camera
 };
 

@@ -28,7 +28,7 @@ struct RecordedTopics {
   std::int64_t first_ns = std::numeric_limits<std::int64_t>::max();  // first recording time
   std::int64_t last_ns = std::numeric_limits<std::int64_t>::min();   // last recording time
 
-  // Returns the index of the topic with equal name, type, md5sum and encoding; appends a new topic.
+  // Index of the topic with equal name, type, md5sum and encoding; appends `topic` if it is new.
   std::size_t index_of(const BagTopic& topic);
   // Counts messages of the topic `index` with recording times from `first` to `last`, ns.
   void add(std::size_t index, std::size_t messages, std::int64_t first, std::int64_t last);
@@ -55,7 +55,7 @@ extern const BagStorage mcap_storage;
 // rosbag2_storage/include/rosbag2_storage/yaml.hpp).
 inline constexpr const char* rosbag2_metadata_name = "metadata.yaml";
 
-// Returns the names of the bag's files, relative to the folder of metadata.yaml (versions 1 to 9).
+// Returns the names of the bag's files, relative to the folder of metadata.yaml (format 1 to 9).
 // Throws Error for a missing or invalid metadata.yaml, no file name, and compressed bags.
 std::vector<std::string> read_rosbag2_metadata(const std::filesystem::path& path);
 

@@ -75,7 +75,7 @@ BagFormat bag_format_of(const std::filesystem::path& path);
 // Names of the files in a folder of BagFormat::sqlite.
 std::vector<std::string> names_in_bag_folder();
 
-// Compression of chunks. bz2: ROS 1 only; zstd: MCAP only. BagFormat::sqlite supports none only.
+// Compression of chunks. bz2: ROS 1 only; zstd: MCAP only. BagFormat::sqlite: only `none`.
 enum class BagCompression { none, bz2, lz4, zstd };
 
 struct BagContent {

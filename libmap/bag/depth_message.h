@@ -20,8 +20,8 @@ struct DepthMessageHead {
   std::string encoding{};     // `encoding` of an Image, e.g. "16UC1"; `format` of a CompressedImage
 };
 
-// Decodes the metadata of an Image or, if `compressed`, of a CompressedImage; 1 KiB of the message
-// is enough. Throws Error if `bytes` ends within the metadata.
+// Decodes the metadata of an Image or, if `compressed`, of a CompressedImage; its first KiB is
+// enough. Throws Error if `bytes` ends within the metadata.
 DepthMessageHead read_image_head(MessageEncoding encoding, std::string_view bytes, bool compressed);
 
 // True for depth images: 16UC1, mono16 and 32FC1; for a CompressedImage, the formats of the plugin
@@ -34,7 +34,7 @@ struct DepthUnits {
 };
 
 struct DepthMessageImage {
-  Image<std::uint16_t> image;       // in units of image_unit_m; 0: no depth; 65535: saturated
+  Image<std::uint16_t> image;       // unit: image_unit_m; 0: no depth; 65535: saturated in message
   std::size_t overflow_pixels = 0;  // number of pixels set to 0 because they exceed 65534 units
 };
 

@@ -1,7 +1,7 @@
 // Encodes and decodes messages in the encodings of bags. Private to libmap/bag.
 //
-// ROS 1 (http://wiki.ros.org/msg#Fields): little-endian, without padding; before a text or an array
-// is its length as uint32. ROS 2: CDR, version 1 (DDS-XTypes 7.4.1): 4 bytes that contain the byte
+// ROS 1 (http://wiki.ros.org/msg#Fields): little-endian, without padding; a text or an array begins
+// with its uint32 length. ROS 2: CDR, version 1 (DDS-XTypes 7.4.1): 4 bytes that contain the byte
 // order, then each number at a multiple of its size; a text ends with a zero byte.
 #pragma once
 

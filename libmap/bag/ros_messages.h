@@ -286,7 +286,7 @@ struct Marker {
   enum : std::int32_t { ARROW = 0, SPHERE_LIST = 7, TEXT_VIEW_FACING = 9 };
   Header header{};
   std::string ns{};
-  std::int32_t id = 0, shape = 0, action = 0;  // 0: add
+  std::int32_t id = 0, shape = 0, action = 0;  // action 0: add
   Pose pose{};
   Vector3 scale{};
   ColorRGBA color{};

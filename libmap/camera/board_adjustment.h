@@ -26,7 +26,7 @@ Eigen::Vector2d board_pixel(const Camera& camera, const Pose& camera_from_board,
 double squared_error(const BoardFit& fit, const BoardCorners& corners);
 
 // Optimizes intrinsics and board poses of `fit` to a local minimum of squared_error (Ceres:
-// Levenberg-Marquardt with the boards eliminated). Returns the squared error.
+// Levenberg-Marquardt with DENSE_SCHUR). Returns the squared error.
 double adjust_boards(BoardFit& fit, const BoardCorners& corners);
 
 // Returns the covariance of the intrinsics (fx fy cx cy, distortion terms) if the detected corners

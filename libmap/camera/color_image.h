@@ -9,7 +9,7 @@ namespace libmap {
 // Returns a camera without distortion, with square pixels and the principal point at the image
 // center, ((width - 1) / 2, (height - 1) / 2). Its image is the largest around the optical axis
 // that `camera` covers, at most twice as wide and high as that of `camera`. The focal length is
-// max(fx, fy) of `camera`. If `camera` has no distortion, square pixels and a principal point at
+// max(fx, fy) of `camera`. If `camera` is undistorted, with square pixels and a principal point at
 // whole or half pixels, pixels of both cameras coincide, so that resampling crops the image. Throws
 // Error for an invalid camera, or if the optical axis is outside the image.
 Camera centered_pinhole(const Camera& camera);

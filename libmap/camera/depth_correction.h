@@ -3,7 +3,7 @@
 //   corrected depth = scale * (depth + offset)
 //   offset = S(depth) + c[0] r^2 + c[1] r^4 + c[2] depth r^2
 // The offset is linear in the coefficients, which are estimated by least squares. (Teichman et al.
-// 2013 correct each range and pixel, which needs more data than a scan.)
+// 2013 correct each range and pixel, which needs more data than one scan.)
 #pragma once
 
 #include <array>
@@ -40,8 +40,8 @@ struct DepthCorrection {
   double bend(double depth_m, double radius2) const {
     return at(depth_m, radius2) - (scale - 1.0) * depth_m;
   }
-  // Throws Error naming the field if the scale is not from 0.5 to 2. With a spline, it must have at
-  // most 1000 coefficients and step_m > 0; coefficients and radial factors must be from -1 to 1.
+  // Throws Error naming the field unless scale is from 0.5 to 2. With a spline, also unless there
+  // are 4 to 1000 coefficients, step_m > 0, and coefficients and radial factors are from -1 to 1.
   void check() const;
   bool operator==(const DepthCorrection&) const = default;
 };

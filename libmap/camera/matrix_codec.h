@@ -52,7 +52,7 @@ inline constexpr std::uint64_t deflate_ratio = 1032;
 inline constexpr std::uint64_t max_matrix_bytes = std::uint64_t{1} << 26;
 
 // Decodes a matrix. Throws Error if the stream is damaged or does not have the declared size, or,
-// before memory is allocated, if this size exceeds max_matrix_bytes or deflate_ratio.
+// before memory is allocated, if this size exceeds max_matrix_bytes or deflate_ratio * stream size.
 StoredMatrix decode_matrix(std::string_view blob);
 // Decodes a matrix of any size in constant memory, and calls `use` for each piece in order. All
 // pieces except the last have a multiple of 8 bytes. Throws Error as decode_matrix does.

@@ -35,7 +35,7 @@ struct RgbdFrame {
 // A camera of a frame with its part of the images.
 struct CameraView {
   Camera color_camera;
-  // color_camera, scaled to the size of `depth` with the principal point, as RTAB-Map does.
+  // color_camera with focal lengths and principal point scaled to the size of `depth`.
   Camera depth_camera;
   ColorImage color;
   DepthImage depth;
@@ -45,7 +45,7 @@ struct CameraView {
 // if an image's width is not a multiple of the number of cameras.
 std::vector<CameraView> camera_views(const RgbdFrame& frame);
 
-// Returns the maximum number of pixels of color image, depth image and all cameras together.
+// Returns the largest number of pixels: of color image, depth image, or all cameras together.
 std::size_t image_pixels(const RgbdFrame& frame);
 
 // Returns the number of frames to keep in memory at a time: 8 of up to 2 megapixels, fewer of

@@ -8,7 +8,7 @@
 
 namespace libmap {
 
-// Keys of the file are those of `simulate scan`; keys "refine.KEY" are used only for refinement.
+// Keys of the file: options of the command `simulate scan`; "refine.KEY" only for refinement.
 // The standard deviation of a depth z is noise_m + noise_of_range z + noise_of_square z^2.
 struct SensorModel {
   double noise_m = 0.0;                  // >= 0; at least one noise value is > 0
@@ -20,7 +20,7 @@ struct SensorModel {
   double rolling_shutter_s = 0.0;        // time from the first to the last row of the color image
   double frame_time_s = 0.033;           // time between two frames
   double max_depth_correction_m = 0.01;  // maximum systematic depth error: constant term
-  double max_depth_correction_of_range = 0.02;  // second term, proportional to depth, m per m
+  double max_depth_correction_of_range = 0.02;  // term proportional to depth, m per m
 };
 void bind(ParameterTable& table, SensorModel& model);
 

@@ -14,7 +14,7 @@ struct StereoDepthOptions {
   int min_disparity_px = 0;     // < 0 only for converging cameras
   int disparities_px = 128;     // range of disparities, 16 to 1024, rounded up to a multiple of 16
   int block_px = 5;             // side of the matched window, odd, 1 to 31
-  int uniqueness_percent = 10;  // 0 to 100: minimum cost difference of best and second-best match
+  int uniqueness_percent = 10;  // 0 to 100: minimum margin from best to second cost, % of second
   int left_right_px = 1;  // maximum disparity difference in the left-right check; -1: no check
   int speckle_px = 100;   // minimum pixels of a connected patch of similar disparity; 0: no limit
   int min_contrast = 2;   // minimum range of gray levels in the left image's window, because

@@ -37,7 +37,7 @@ std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format
 // Part of a model with one texture page.
 struct ModelPart {
   TriangleMesh mesh;
-  std::vector<Eigen::Vector2f> texture_coordinates;  // one per vertex, from the top left; or empty
+  std::vector<Eigen::Vector2f> texture_coordinates;  // one per vertex; top left is 0, 0; or empty
   std::int32_t page = no_page;                       // index of the texture image
 };
 

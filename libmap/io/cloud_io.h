@@ -34,7 +34,7 @@ namespace libmap {
 
 struct CloudReadResult {
   PointCloud cloud;
-  std::size_t dropped_points = 0;  // points that are not finite, or undeclared nodata (DemBlock)
+  std::size_t dropped_points = 0;  // points that are not finite; in DEMs also -9999 etc. (DemBlock)
   GeometryFileInfo info;
 };
 
@@ -78,7 +78,7 @@ std::string read_head(const std::filesystem::path& path);
 // Returns the content of a file. Throws Error if it is missing, a folder, unreadable or empty.
 std::shared_ptr<const std::string> read_geometry_bytes(const std::filesystem::path& path);
 
-// Creates the file `path` and calls write(stream). Adds the file to Errors of `write`. Throws Error
+// Creates the file `path` and calls write(stream). Adds `path` to Errors of `write`. Throws Error
 // (failed) if the file was not written completely.
 void write_geometry_file(const std::filesystem::path& path,
                          const std::function<void(std::ostream&)>& write);

@@ -68,8 +68,8 @@ class TileIndex {
   using Visit = std::function<void(const PointCloud& tile)>;
   TileIndex(std::vector<std::filesystem::path> tiles, const Visit& visit);
 
-  std::size_t points() const { return points_; }           // in all files, with finite positions
-  std::size_t dropped_points() const { return dropped_; }  // see CloudReadResult, of all files
+  std::size_t points() const { return points_; }           // finite points of all files
+  std::size_t dropped_points() const { return dropped_; }  // sum over files, as CloudReadResult
 
   // Returns the points with low <= (x, y) < high, m, in the order of the files, with the colors and
   // fields that all files of these points have. Caches recently used files, up to 4 million points.

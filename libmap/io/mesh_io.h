@@ -57,9 +57,9 @@ void require_mesh_format(const std::filesystem::path& path);
 // many programs read .obj. The error names `format`, e.g. ".stl".
 void require_single_precision(const TriangleMesh& mesh, const std::string& format);
 
-// Returns `mesh` if the file, or a file of the folder, contains faces, else `cloud`: by the
-// extension, and for .ply by the header. Throws Error if the extension is unknown or the header of
-// a .ply cannot be read.
+// Returns `mesh` for a file with faces, a .tif, or a folder with a mesh file that has faces; else
+// `cloud`. The extension decides, for .ply the header. Throws Error if the extension is unknown or
+// the header of a .ply cannot be read.
 FileKind file_kind(const std::filesystem::path& path);
 
 }  // namespace libmap

@@ -11,9 +11,9 @@
 namespace libmap {
 
 // Returns the mesh with positions in double precision. Polygons are split into triangle fans. Each
-// `v` line (position) that a face uses becomes a vertex; its normal is the mean `vn` of its
-// corners. Vertices with equal position, color and normal are merged. Vertices are in the order of
-// first use. Normals and colors are kept only if all corners have them. Throws Error naming the
+// `v` line (position) that a face uses becomes a vertex, in the order of first use; its normal is
+// the mean `vn` of its corners. Vertices with equal position, color and normal are merged. Normals
+// are kept if all corners have them, colors if all `v` lines have them. Throws Error naming the
 // line for an invalid number, an index out of range, or a face with fewer than three corners.
 TriangleMesh decode_obj(std::string_view text);
 

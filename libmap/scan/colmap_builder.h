@@ -21,9 +21,9 @@ struct ColmapBuilderOptions {
 void bind(ParameterTable& table, ColmapBuilderOptions& options);
 
 // An image observes each earlier point whose depth it measures at the point's projection, so that
-// reprojection errors are 0 by construction (stored as -1, unknown). It adds a point in each cell
-// of a pixel grid in which it observes no point and has no depth edge. Images of cameras with equal
-// intrinsics share a COLMAP camera.
+// reprojection errors are 0 by construction (stored as -1, unknown). It adds a point at the center
+// of each grid cell in which it observes no point, if it has depth there and no depth edge. Images
+// of cameras with equal intrinsics share a COLMAP camera.
 class ColmapBuilder {
  public:
   explicit ColmapBuilder(const ColmapBuilderOptions& options = {});  // an empty model

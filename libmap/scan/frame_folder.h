@@ -18,8 +18,8 @@
 //
 // Without nodes.csv, color and depth images are paired by stamp; nodes are numbered from 1 in the
 // order of time and have the stamp of the depth image. Poses are assigned by node id if all poses
-// of a file have one. Otherwise, a node has the pose at its stamp, interpolated between the poses
-// before and after if both are within pairing_tolerance_s, or the only pose within it.
+// of a file have one. Otherwise, a node's pose is interpolated between the poses before and after
+// its stamp if both are within pairing_tolerance_s; if only one of them is, it is the node's pose.
 #pragma once
 
 #include <filesystem>

@@ -18,7 +18,7 @@ std::string image_file_name(int node, std::size_t camera, const std::string& ext
 
 struct ImageFile {
   std::string name{};   // as image_file_name
-  std::string bytes{};  // a PNG; the stored file if the scan is an RTAB-Map database of one camera
+  std::string bytes{};  // stored file of an RTAB-Map database with one camera; else a new PNG
 };
 
 // Returns the image file of camera `camera`; `views` are the views of the node's frame, with color.
@@ -38,7 +38,7 @@ void bind(ParameterTable& table, ViewSelectionOptions& options);
 
 // Selects views greedily by descending quality; returns their indices, ascending. A view is
 // selected if it is not similar to a selected view, so each other view is similar to a better
-// selected one. `qualities` has one value per view; the first of equal views is better.
+// selected one. `qualities` has one value per view; of equal values, the first is better.
 std::vector<std::size_t> select_views(const std::vector<Pose>& world_from_camera,
                                       const std::vector<double>& qualities,
                                       const ViewSelectionOptions& options = {});

@@ -34,10 +34,10 @@ struct ImportedPoses {
   NodeTrajectory trajectory;      // poses ascending by node id, and number of unmatched poses
   std::size_t poses_in_file = 0;  // number of poses in the file
   double scale = 1.0;             // meters per unit of the file's positions
-  // Maximum distance of a node's base positions, one by each of its cameras, from their mean.
+  // Maximum distance from a node's position to the base position that one of its cameras yields.
   double max_rig_deviation_m = 0.0;
-  // Reports dropped poses (the camera does not exist or has no usable calibration), and motion
-  // between successive poses that differs from the scan's in length (unit) or rotation (axes).
+  // Reports dropped poses (no such camera, or no usable calibration). Also reports if distances or
+  // rotations between successive poses differ from the scan's, as with a wrong unit or wrong axes.
   std::vector<std::string> warnings{};
 };
 

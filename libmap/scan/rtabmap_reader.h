@@ -69,7 +69,7 @@ class RtabmapDatabase : public ScanSource {
 
   const std::filesystem::path& path() const override { return path_; }
   const PoseGraph& graph() const override { return graph_; }
-  // Converts gray images to color. Images without depth in the column depth become `right`.
+  // Converts gray images to color. Images in the column `depth` that are not depth become `right`.
   RgbdFrame read_frame(int node, FrameParts parts = {}) const override;
 
   // Version that the file contains (Admin.version); empty if missing.
@@ -85,7 +85,7 @@ class RtabmapDatabase : public ScanSource {
   std::size_t feature_count() const;  // number of image features of all nodes
   // Returns the sizes of the stored map. Throws Error naming file and column for damaged data.
   StoredMap stored_map() const;
-  // Calls `use` for each node with images in the file, in ascending order. Reads headers only.
+  // Calls `use` for each node in the table of images, ascending by id. Reads headers only.
   void each_content(const std::function<void(const NodeContent&)>& use) const;
 
   // Returns a node's stored images; color is JPEG or PNG. Throws Error for an unknown node.

@@ -39,7 +39,7 @@ class RtabmapWriter {
   // Adds a node with images. Nodes can be added in any order of ids. Poses are stored as float32.
   void add_node(const GraphNode& node, const RgbdFrame& frame);
   // Adds a link in both directions with equal information matrix, as RTAB-Map does; priors, gravity
-  // and landmark links in one direction. Its nodes may be added later.
+  // and landmark links in one direction. The nodes may be added later.
   void add_link(const PoseLink& link);
   // Completes and closes the file; no journal remains next to it. Without this call, the file is
   // not a valid scan.

@@ -52,8 +52,8 @@ std::unique_ptr<ScanSource> open_scan(const std::filesystem::path& path);
 
 // Joins several scans, for example of different days. Node ids of scan n (from 0) increase by n *
 // step, where step is the smallest power of ten above all ids. With step 100, node 12 of the second
-// scan becomes 112. Sessions, which keep their frames, and landmarks are renumbered likewise.
-// Optimized poses are dropped, because the frames differ. A single scan is returned unchanged.
+// scan becomes 112, and landmark -12 becomes -112. Session numbers continue from scan to scan.
+// Optimized poses are dropped, because map frames differ. A single scan is returned unchanged.
 // Throws Error for no scan, too large ids, or a file given twice.
 std::unique_ptr<ScanSource> join_scans(std::vector<std::unique_ptr<ScanSource>> scans);
 

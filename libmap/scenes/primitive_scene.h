@@ -105,7 +105,7 @@ struct SurfaceTruth {
   double curvature_max = 0.0;  // larger principal curvature, 1/m
   // Height above the first plane without its bumps, along its normal, m; without a plane, z.
   double height = 0.0;
-  // Index in PrimitiveScene::shapes; on the ground within bumps, the bump with the largest height.
+  // Index in PrimitiveScene::shapes; on the ground within bumps, the bump of the largest |height|.
   int shape = 0;
 };
 

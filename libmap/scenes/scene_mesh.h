@@ -23,7 +23,7 @@ struct SceneMeshOptions {
 //     of the mesh is the outline of the plane.
 //   - Two solids, or a solid and a second plane, share no vertices: cut edges agree only to within
 //     the sag of a chord of edge_length_m, and parts thinner than edge_length_m may be missed.
-//   - Beyond the outline of the ground, the ground's triangles are kept or dropped as a whole.
+//   - Where a solid crosses the ground's outline, ground triangles are kept or dropped uncut.
 // Throws Error for an invalid scene, or one with about more than max_triangles.
 TriangleMesh scene_mesh(const PrimitiveScene& scene, const SceneMeshOptions& options);
 

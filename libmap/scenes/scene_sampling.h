@@ -27,7 +27,7 @@ struct SceneSamples {
 // Samples the visible surface uniformly by area: a jittered grid on the parametrization of each
 // face. On flat faces, each square of side (1 + jitter) * spacing contains a point; on other faces,
 // gaps may be wider by a few percent. Equal input yields equal bytes. Throws Error for an invalid
-// scene, more than max_points visible points, or ten times as many with hidden points.
+// scene, more than max_points visible points, or 10 max_points including hidden ones.
 SceneSamples sample_scene(const PrimitiveScene& scene, const SceneSamplingOptions& options);
 
 }  // namespace libmap

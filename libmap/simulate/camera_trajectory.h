@@ -53,8 +53,8 @@ struct CameraTrajectoryOptions {
 // Binds all fields except the target.
 void bind(ParameterTable& table, CameraTrajectoryOptions& options);
 
-// Returns the height of the ground around a site: the median z of the vertices within a tenth of
-// the mesh's length or width from its bounding box. Throws Error for a mesh without vertices.
+// Returns the height of the ground around a site: the median z of the vertices in the outer tenths
+// of the mesh's range of x or of y. Throws Error for a mesh without vertices.
 double surrounding_ground_height(const TriangleMesh& mesh);
 
 // Function that returns the pose of the camera's body (x forward, y left, z up) in the mesh's

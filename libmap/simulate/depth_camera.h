@@ -40,7 +40,7 @@ struct SurfaceView {
   Image<Eigen::Vector3f> color;  // 0 to 1; mean of the colors at the center (1/2) and corners (1/8)
 };
 
-// Source of colors. mesh: vertex colors; rock: rock_color(); automatic: rock if colors are equal.
+// Source of colors. mesh: vertex colors; rock: rock_color(); automatic: mesh if its colors differ.
 enum class TextureSource { automatic, mesh, rock };
 
 // Source of the normals for shading: estimated from the mesh, or vertex normals of the mesh.
@@ -91,7 +91,7 @@ struct DepthSensorOptions {
   double near_m = 0.5;              // minimum measured depth
   double far_m = 4.5;               // maximum measured depth
   double max_incidence_deg = 80.0;  // maximum angle between ray and normal; 90: no limit
-  double edge_gap_m = 0.05;         // a pixel with a larger depth discontinuity is an edge pixel
+  double edge_gap_m = 0.05;         // edge pixel: a larger depth jump, or a corner without depth
   double flying_pixels = 0.35;      // fraction of edge pixels that mix foreground and background
   double edge_dropouts = 0.35;      // fraction of edge pixels without depth
 

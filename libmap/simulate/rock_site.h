@@ -77,7 +77,7 @@ struct RockSite {
   std::vector<SceneShape> bumps;  // shapes of type Bump only
   std::vector<SiteRock> rocks;
 
-  // Throws Error if a rock has a value out of range or extends beyond the ground.
+  // Throws Error if a rock has a value out of range or is not at least 5 cm inside the ground.
   void check() const;
   Pose site_from_ground() const;  // rotation by tilt_deg
 };
@@ -124,10 +124,10 @@ class GroundRelief {
 //     - {name: R01, height_m: 0.67, overhang_deg: 15}
 //     - {name: C01, shape: cobble, height_m: 0.15, x_m: 1, y_m: 0.2}
 //
-// All keys are optional, except the height of a rock. Missing values of a rock are drawn from its
-// seed; a missing seed is drawn from the site's seed. Rocks without x_m and y_m are placed within
-// the layout. `seed` replaces the file's seed. Throws Error naming `file`, entry, key, value and
-// bound; for an unknown key, also the nearest known key.
+// Required are only height_m of a rock, and height_m and radius_m of a bump. Missing values of a
+// rock are drawn from its seed, a missing seed from the site's seed. Rocks without x_m and y_m are
+// placed within the layout. `seed` replaces the file's seed. Throws Error naming `file`, entry,
+// key, value and bound; for an unknown key, also the nearest known key.
 RockSite parse_site(const std::string& text, const std::string& file,
                     std::optional<std::uint64_t> seed = std::nullopt);
 

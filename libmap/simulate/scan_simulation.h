@@ -26,7 +26,7 @@ namespace libmap {
 struct OdometryOptions {
   double error_of_distance = 0.01;  // standard deviation in each axis, m per m of distance
   double error_of_turn = 0.005;  // standard deviation about each axis, degrees per degree of turn
-  double turn_of_distance_deg = 0.2;  // added about each axis, degrees per m of distance
+  double turn_of_distance_deg = 0.2;  // more deviation about each axis, degrees per m of distance
 };
 // Minimum standard deviations of an odometry step in and about each axis.
 inline constexpr double min_odometry_error_m = 2e-4;

@@ -11,7 +11,7 @@ namespace libmap {
 
 // Returns a rock as solid in the rock frame: the ground is z = 0, the top is z = height_m. Above
 // the ground, it extends by width_m in x and depth_m in y, centered on the origin. It extends down
-// to about z = -sink_m; for cobbles and holds, the shape sets the lowest z. All labels are 0.
+// to about z = -sink_m; for cobbles and holds, the shape sets the lowest z. Solid::labels are 0.
 Solid rock_solid(const SiteRock& rock, double edge_length_m, double sink_m);
 
 struct SiteMeshOptions {

@@ -46,7 +46,7 @@ class TerrainSurface {
   TerrainSurface(const PointTileStore& points, const GroundHeights& heights,
                  const TerrainSurfaceOptions& options = {});
 
-  // Returns the surface in view of each of several cameras, which may have several poses. The
+  // Returns for each of several frames the surface in view from any of its camera poses. The
   // result does not depend on earlier calls and stays valid after later calls.
   std::vector<VisibleSurface> seen_from(const std::vector<std::vector<Pose>>& world_from_camera,
                                         const ViewRange& range);
