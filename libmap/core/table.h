@@ -16,7 +16,7 @@ struct Table {
   std::string file;                            // source file, for errors; can be empty
 
   std::optional<std::size_t> find_column(std::string_view name) const;  // index or nullopt
-  // Returns the index of a column. Throws Error naming file, column and the nearest known column.
+  // Returns a column's index. If missing, throws Error naming file, column and a similar column.
   std::size_t column(std::string_view name) const;
   // Returns a cell as a number. Throws Error naming file, row (from 1) and column for other text.
   double number(std::size_t row, std::size_t column) const;

@@ -7,9 +7,9 @@
 //  2. cut at edges of more than two triangles, at vertices of more than one fan of triangles and
 //     where no consistent orientation exists; keep the orientation of most of the area
 //     (make_manifold); remove caps (triangles with a corner on the opposite edge; flip_caps)
-//  3. drop islands
-//  4. remove intersecting triangles and the triangles around them, and close the resulting holes if
-//     possible (self_intersections, hole_filling)
+//  3. drop islands (components with a small area)
+//  4. remove intersecting or degenerate triangles with the triangles around them; close these holes
+//     if possible (self_intersections, hole_filling)
 //  5. fill holes (hole_filling)
 //  6. smooth, decimate, then step 4 again
 //  7. drop islands again, estimate vertex normals

@@ -43,7 +43,7 @@ libmap::ColorImage draw_score_change(const MapImage& image, const libgtd::MapCha
                                      const libgtd::VoxelMap& other);
 
 struct MapTableOptions {
-  std::string expected;                         // CSV of ExpectedMap; empty: no expectations
+  std::string expected;                         // CSV of regions with expected result; empty: none
   PointFrame points_frame = PointFrame::input;  // frame of `expected`
   std::string cutoff = "auto";  // minimum score of a graspable voxel; auto: each map's threshold
   std::string names;            // names of the maps, separated by '|'; empty: names of the files
