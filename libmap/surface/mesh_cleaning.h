@@ -90,7 +90,7 @@ MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOption
 // are avoided. Then max_error_m is proved to bound the distance between both surfaces: triangles of
 // each surface are divided until all corners of a part, and so by convexity the part, are within
 // max_error_m of one triangle of the other surface. Vertices of triangles that fail are locked, and
-// decimation is repeated, later with a smaller tolerance. If all attempts fail, the mesh is
+// decimation is repeated; late attempts have a smaller tolerance. If all attempts fail, the mesh is
 // unchanged. Remaining vertices and triangles keep values and order. Requires an oriented manifold.
 MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m,
                              Progress& progress = no_progress());

@@ -57,7 +57,7 @@ struct MapTableOptions {
 void bind(libmap::ParameterTable& table, MapTableOptions& options);
 
 // Writes maps.csv, histograms.csv with a chart and, if requested, pairs.csv, regions.csv and charts
-// of graspable_share, voxel_youden and place_youden against the varied parameter into `folder`.
+// of maps.csv (graspable_share, voxel_youden and place_youden by the varied column) into `folder`.
 // Throws Error naming the file if a map or table is invalid.
 void tabulate_maps(const std::vector<std::string>& map_files, const std::string& folder,
                    const MapTableOptions& options, Run& run);
