@@ -26,7 +26,7 @@ struct Table {
 
 // Parses CSV text with a header line, quotes as in RFC 4180 and line ends CRLF, LF or CR. Skips a
 // UTF-8 byte order mark, empty lines and lines that begin with '#'. Throws Error if there is no
-// header, a row has another length, the separator is not a comma, or a quote is not closed.
+// header, a row has another length, the separator is not a comma, or the text is otherwise invalid.
 Table parse_csv(std::string_view text, const std::string& file);
 Table read_csv(const std::filesystem::path& path);  // throws also if the file cannot be read
 std::string to_csv(const Table& table);             // returns CSV text with a header line
