@@ -2,7 +2,7 @@
 // GRASPMAP_LOOPS as the path of that file. The file defines functions and, at its end, the table
 // `all` of these functions; in it, GRASPMAP_REGISTER is the size of the vector registers in bytes.
 // Include this header in an anonymous namespace of a source that is not part of a unity build. The
-// file must not use inline functions of other sources: the linker could keep only AVX copies.
+// file must not use inline functions of other sources: the linker could keep only their AVX code.
 
 #define GRASPMAP_REGISTER 16
 namespace portable {

@@ -32,7 +32,7 @@ struct Manifest {
   std::vector<ManifestInput> inputs;
   std::string frame;                                     // frame of the output's coordinates
   std::vector<std::pair<std::string, Pose>> transforms;  // by name, e.g. "terrain_from_input"
-  // Georeference of coordinates before the `transforms` site_from_map and terrain_from_input.
+  // Georeference of the original coordinates: before site_from_map and terrain_from_input.
   std::optional<Georeference> georeference;
   std::vector<std::pair<std::string, ManifestValue>> results;  // by key, e.g. counts and residuals
   std::vector<std::pair<std::string, double>> timings_s;       // by step; in the section "run"

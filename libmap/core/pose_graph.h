@@ -66,8 +66,8 @@ struct GraphNode {
   double stamp_s = 0.0;
   std::string label{};                              // name by the user; mostly empty
   std::optional<Pose> odometry_from_base{};         // pose by odometry
-  std::optional<Pose> truth_from_base{};            // ground truth pose, in a frame of its own
-  std::optional<std::array<double, 6>> velocity{};  // x y z roll pitch yaw, m/s and rad/s
+  std::optional<Pose> truth_from_base{};            // true pose, in the frame of the ground truth
+  std::optional<std::array<double, 6>> velocity{};  // by RTAB-Map: x y z roll pitch yaw, m/s, rad/s
   std::optional<GpsFix> gps{};
 };
 

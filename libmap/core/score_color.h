@@ -1,4 +1,4 @@
-// Colors of graspability scores, as in the thesis that the README cites, for files and images.
+// Colors of graspability scores, as in "Graspable Target Detection for Hexapod Robots" (2023).
 #pragma once
 
 #include <array>

@@ -16,7 +16,7 @@ struct Table {
   std::string file;                            // source file, for errors; can be empty
 
   std::optional<std::size_t> find_column(std::string_view name) const;  // index or nullopt
-  // Returns the index of a column. Throws Error naming file, column and the nearest known column.
+  // Returns a column's index. If missing, throws Error naming file, column and a similar column.
   std::size_t column(std::string_view name) const;
   // Returns a cell as a number. Throws Error naming file, row (from 1) and column for other text.
   double number(std::size_t row, std::size_t column) const;
@@ -26,7 +26,7 @@ struct Table {
 
 // Parses CSV text with a header line, quotes as in RFC 4180 and line ends CRLF, LF or CR. Skips a
 // UTF-8 byte order mark, empty lines and lines that begin with '#'. Throws Error if there is no
-// header, a row has another length, the separator is not a comma, or a quote is not closed.
+// header, a row has another length, the separator is not a comma, or the text is otherwise invalid.
 Table parse_csv(std::string_view text, const std::string& file);
 Table read_csv(const std::filesystem::path& path);  // throws also if the file cannot be read
 std::string to_csv(const Table& table);             // returns CSV text with a header line

@@ -64,8 +64,8 @@ Error wrong_columns(const std::string& reason, const TextLine& line, const std::
 // Returns an error for a record, e.g. "node 7", that an earlier line has already defined.
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file);
 
-// Throws Error unless `bytes` bytes can contain `rows` rows of `row_bytes` bytes, or, in the second
-// function, `rows` lines of `words` words. `what` names the rows in the error, e.g. "points".
+// Throw Error unless `bytes` bytes can contain `rows` rows of `row_bytes` bytes (require_rows) or
+// `rows` lines of `words` words (require_room_for_text). `what` names the rows, e.g. "points".
 void require_rows(std::uint64_t rows, std::uint64_t row_bytes, std::uint64_t bytes,
                   const std::string& what);
 void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,

@@ -10,7 +10,7 @@
 namespace libmap {
 
 // Minimum of NormalVotes::fraction() of a surface whose normals have correct signs. Measured: 0.92
-// for rocks on the ground, scanned from all sides. Random signs (up to 0.82) fail the next bound.
+// for rocks scanned from all sides. Random signs yield up to 0.82 but exceed max_opposing_fraction.
 inline constexpr double min_agreeing_fraction = 0.8;
 // Maximum of opposing_fraction() for correct signs; only thin parts have opposing neighbors then.
 inline constexpr double max_opposing_fraction = 0.1;
@@ -51,7 +51,7 @@ struct UpOfNormals {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // unit vector upwards
   double fraction = 0.0;  // NormalVotes::fraction() of the normals; 0: no normals
   double opposing = 0.0;  // opposing_fraction() of the normals
-  bool decided = false;   // true if both shares are within the bounds above; else `direction` is +z
+  bool decided = false;   // true if `fraction` and `opposing` are within the bounds above
 };
 
 // Returns the up direction of a surface: the mean of the normals, repeatedly restricted to normals

@@ -48,7 +48,7 @@ double median_spacing(const std::vector<Eigen::Vector3d>& points);
 
 struct CloudSpacing {
   // Median distance from a point to the nearest point at another position. If most points are
-  // near-duplicates (multiple returns, joined clouds), nearest_m is by_area_m of the merged points.
+  // near-duplicates (multiple returns, joined clouds), nearest_m is by_area_m after merging these.
   double nearest_m = 0.0;
   double by_area_m = 0.0;  // spacing of a square grid with the cloud's number of points per area
 };
@@ -97,7 +97,7 @@ class GrowingGrid {
     return false;
   }
 
-  // True if a squared distance to `position` is below `square_m2`, the square of `radius_m`.
+  // True if a point's squared distance to `position` is below `square_m2`, which is radius_m^2.
   bool any_nearer(const Eigen::Vector3d& position, double radius_m, double square_m2) const {
     const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius_m);
     return any_in_box(position - reach, position + reach,

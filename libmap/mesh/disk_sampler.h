@@ -28,7 +28,7 @@ struct PlacedFragment {
   // Return the area and the squared length of the longest side, m2.
   double area_m2() const;
   double square_of_longest_side() const;
-  // Returns the halves on both sides of the longest side's midpoint (Rivara 1984).
+  // Returns the two parts after bisection at the midpoint of the longest side (Rivara 1984).
   std::array<PlacedFragment, 2> halves() const;
 };
 PlacedFragment placed(const TriangleMesh& mesh, const Fragment& fragment);
@@ -89,7 +89,7 @@ struct DiskSamples {
 // Expected value of samples * radius^2 / area for random samples in the plane without gaps: discs
 // of half the radius cover 0.547 of the plane.
 inline constexpr double saturation_density = 0.6965;
-// Approximate share of the samples that sample_disks finds by darts over the whole surface.
+// Approximate share of the samples that sample_disks finds before it fills the gaps.
 inline constexpr double dart_fraction = 0.808;
 
 // Returns random samples with a minimum distance of `radius_m`. Tries random points (darts) over

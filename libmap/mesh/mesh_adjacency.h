@@ -68,9 +68,9 @@ VertexTriangles triangles_at_vertices(const std::vector<Triangle>& triangles, st
 std::vector<HalfEdge> corner_fans(const std::vector<Triangle>& triangles,
                                   const std::vector<HalfEdge>& opposite);
 
-// Returns chains of half-edges with opposite = open_edge, each from its lowest half-edge on. For an
-// oriented manifold, they are closed boundary loops against the direction of the half-edges (from
-// target to source). If several chains contain a vertex, each follows its own fan of triangles.
+// Returns chains of half-edges with opposite = open_edge, each beginning with its lowest half-edge.
+// For an oriented manifold, the chains are closed boundary loops, followed from target to source of
+// each half-edge. If several chains contain a vertex, each follows one fan of triangles.
 std::vector<std::vector<HalfEdge>> boundary_loops(const std::vector<Triangle>& triangles,
                                                   const std::vector<HalfEdge>& opposite);
 

@@ -18,7 +18,7 @@ struct PoissonDiskOptions {
   // > 0: minimum distance between samples. Every disc of this radius on the surface contains a
   // sample; with the default, so does every 1 cm voxel (usual in maps) that level ground crosses.
   double radius_m = 0.005;
-  std::uint64_t count = 0;  // > 0: number of samples (within 1 %), instead of radius_m
+  std::uint64_t count = 0;  // > 0: number of samples (within 1 %), instead of radius_m; 0: not used
   std::uint64_t seed = 1;   // random seed of the samples
 };
 void bind(ParameterTable& table, PoissonDiskOptions& options);

@@ -42,14 +42,14 @@ struct CropOptions {
   // Counter-clockwise rotation about z. nullopt: for regions size and border, the smallest rotation
   // that makes the sides parallel to x and y; no rotation otherwise.
   std::optional<double> yaw_deg = std::nullopt;
-  // true: x = y = 0 is the center of the outline's box (whole, CropFrame::map: the result's box).
+  // true: centers the outline's box on x = y = 0 (for region whole or frame map: the result's box).
   bool center = false;
 };
 // Binds ground, rectangle, band and center.
 void bind(ParameterTable& table, CropOptions& options);
 
 struct CropReport {
-  Pose site_from_map = Pose::Identity();
+  Pose site_from_map = Pose::Identity();          // site frame: frame of the result
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // in the map, used to find the ground
   std::optional<UpOfNormals> up_of_normals{};     // set if `up` comes from normals
   std::optional<GroundPlane> ground{};            // in the map; none without leveling

@@ -25,8 +25,8 @@ struct SiteRectangle {
 // size_m.x() along its x axis and size_m.y() along its y axis. Among equal rectangles, the smallest
 // rotation and the mean position are used. `points` are the measured points in the x-y plane, with
 // gaps below max_gap_m between neighbors. Clearances down to one cell below margin_m are accepted.
-// Throws Error if an option is out of range, there is no point, or no rectangle fits (the error's
-// bound is the largest size that fits).
+// Throws Error if an option or the size is invalid, there is no point, the points extend too far
+// for a site of this size, or no rectangle fits (the error's bound is the largest size that fits).
 SiteRectangle find_site_rectangle(const std::vector<Eigen::Vector2d>& points,
                                   const Eigen::Vector2d& size_m,
                                   const SiteRectangleOptions& options = {});

@@ -20,10 +20,10 @@ using BoundaryLoop = std::vector<HalfEdge>;  // closed boundary, as from boundar
 
 // Returns the holes of an oriented manifold: boundaries with a diameter (largest distance between
 // two vertices) of at most `max_hole_m`. The longest boundary of a component is the outer boundary
-// and no hole, unless its radius is less than half of the component's radius (both from the mean of
-// the boundary's vertices). With `known`, the mesh is part of a larger mesh and complete only in
-// this box in x and y: boundaries that extend beyond the box are no holes, and components that
-// extend beyond the box have no outer boundary.
+// and no hole, unless its radius is below half of the component's radius. Both radii are the
+// largest distance of a vertex from the mean of the boundary. With `known`, the mesh is part of a
+// larger mesh and complete only in this box in x and y: boundaries that extend beyond the box are
+// not holes, and components that extend beyond the box have no outer boundary.
 using XyBox = Eigen::AlignedBox2d;
 std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m,
                                      const std::optional<XyBox>& known = std::nullopt);

@@ -7,9 +7,9 @@
 //  2. cut at edges of more than two triangles, at vertices of more than one fan of triangles and
 //     where no consistent orientation exists; keep the orientation of most of the area
 //     (make_manifold); remove caps (triangles with a corner on the opposite edge; flip_caps)
-//  3. drop islands
-//  4. remove intersecting triangles and the triangles around them, and close the resulting holes if
-//     possible (self_intersections, hole_filling)
+//  3. drop islands (components with a small area)
+//  4. remove intersecting or degenerate triangles with the triangles around them; close these holes
+//     if possible (self_intersections, hole_filling)
 //  5. fill holes (hole_filling)
 //  6. smooth, decimate, then step 4 again
 //  7. drop islands again, estimate vertex normals
@@ -90,7 +90,7 @@ MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOption
 // are avoided. Then max_error_m is proved to bound the distance between both surfaces: triangles of
 // each surface are divided until all corners of a part, and so by convexity the part, are within
 // max_error_m of one triangle of the other surface. Vertices of triangles that fail are locked, and
-// decimation is repeated, later with a smaller tolerance. If all attempts fail, the mesh is
+// decimation is repeated; late attempts have a smaller tolerance. If all attempts fail, the mesh is
 // unchanged. Remaining vertices and triangles keep values and order. Requires an oriented manifold.
 MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m,
                              Progress& progress = no_progress());

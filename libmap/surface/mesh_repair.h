@@ -32,14 +32,14 @@ std::vector<bool> repeated_triangles(const std::vector<Triangle>& triangles);
 
 // Removes caps (degenerate triangles with a corner on the opposite edge) from an oriented manifold:
 // flips this edge, or drops the cap if the edge belongs to no other triangle. Keeps a cap if the
-// new edge exists already, or if it depends on other caps. Returns the number of removed caps.
+// new edge exists, or the edge's other triangle is a kept cap. Returns the number of removed caps.
 std::size_t flip_caps(TriangleMesh& mesh);
 
 struct ManifoldCuts {
   std::size_t edges = 0;     // cut edges: more than two triangles, or a one-sided surface
   std::size_t vertices = 0;  // new copies of vertices, one per additional fan of triangles
   std::size_t turned = 0;    // triangles with reversed orientation
-  std::size_t dropped = 0;   // removed triangles that fold back on an edge
+  std::size_t dropped = 0;   // removed triangles at edges that cuts cannot make manifold
 };
 
 // Cuts a set of triangles into an oriented manifold (Gueziec, Taubin, Lazarus, Horn 2001, "Cutting

@@ -22,7 +22,7 @@ enum class SurfaceMethod { implicit, poisson };
 
 struct SurfaceReconstructionOptions {
   SurfaceMethod method = SurfaceMethod::implicit;
-  // >= 1.5, for implicit: radius of influence of a point, in cells or, if larger, point distances.
+  // 1.5 to 10, implicit: influence radius of a point, in units of max(cell size, point spacing).
   double support_cells = 2.5;
   // >= 0: size of the grid's or the octree's finest cells, and about the length of the mesh's
   // edges. 0: the median distance between nearest neighbors (median_spacing).
@@ -33,7 +33,7 @@ struct SurfaceReconstructionOptions {
   bool weigh_by_error = true;
   // > 0, for poisson: minimum number (or weight) of points per cell; with fewer, cells are larger.
   double samples_per_cell = 2.15;
-  // > 0: maximum distance of the surface from all points, in cells or, if larger, point distances.
+  // > 0: maximum distance of the surface from points, in units of max(cell size, point spacing).
   double trim_distance_cells = 1.5;
 };
 void bind(ParameterTable& table, SurfaceReconstructionOptions& options);
@@ -69,7 +69,7 @@ struct SurfaceReconstructionResult {
   double cell_size_m = 0.0;           // the option cell_size_m, or spacing_m if that is 0
   double spacing_m = 0.0;             // median distance to the nearest neighbor
   std::size_t dropped_points = 0;     // points with a normal that is zero or not finite
-  std::size_t samples = 0;            // number of samples: one per cell and side of the surface
+  std::size_t samples = 0;            // samples: mean points, one per cell and side of the surface
   int octree_depth = 0;               // poisson; otherwise 0
   std::size_t trimmed_triangles = 0;  // removed: too far from points, or against their normals
   StageTimings timings_s;

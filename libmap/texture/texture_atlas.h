@@ -1,7 +1,7 @@
 // Packs the charts of a mesh onto texture pages. Private to libmap/texture.
 //
-// A chart is a connected set of triangles with texture from one photograph. Texture coordinates are
-// scaled pixels of the photograph, shifted by whole texels; at scale 1, a texel is a pixel.
+// A chart is a connected set of triangles with texture from one photograph. Chart positions are
+// scaled and shifted pixel positions of the photograph; at scale 1, a texel is a pixel.
 #pragma once
 
 #include <Eigen/Core>

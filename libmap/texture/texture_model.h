@@ -49,10 +49,10 @@ struct TextureCounts {
   std::size_t unseen_triangles = 0;  // triangles without a photograph
   double seen_m2 = 0.0;              // area with a photograph
   double unseen_m2 = 0.0;            // area without a photograph
-  std::size_t charts = 0;            // this and the following three as in TextureAtlas
-  std::size_t split_charts = 0;
-  std::size_t shrunk_charts = 0;
-  std::size_t pages = 0;
+  std::size_t charts = 0;            // connected sets of triangles textured from one photograph
+  std::size_t split_charts = 0;      // charts that were split because they exceeded a page
+  std::size_t shrunk_charts = 0;     // single triangles larger than a page that were scaled down
+  std::size_t pages = 0;             // number of texture images
   double atlas_scale = 1.0;     // minimum scale of the charts; below 1 if reduced for max_pages
   double texels = 0.0;          // texels covered by triangles
   double seams_before_m = 0.0;  // length of the seams if each triangle had its best photograph

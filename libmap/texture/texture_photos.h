@@ -35,9 +35,9 @@ class PhotoProjector {
   // range of the lens model. The pixel may be outside the image.
   Eigen::Vector3d project(const Eigen::Vector3d& point_in_world) const;
 
-  // Returns an upper bound, in pixels, of the projected length of any segment of length `length_m`
-  // within the ball: 0 only if the ball is outside the photograph, infinite if the camera is in the
-  // ball or the field of view is unknown. Assumes that distortion at most doubles lengths.
+  // Returns an upper bound, in pixels, of the projected length of any segment of `length_m` in the
+  // ball (center, radius_m): 0 only if the ball is outside the image, infinite if the camera is
+  // in the ball or the field of view is unknown. Assumes that distortion at most doubles lengths.
   double max_pixels(const Eigen::Vector3d& center, double radius_m, double length_m) const;
 
  private:
@@ -67,10 +67,10 @@ class OccluderCells {
   // Adds a surface point by pixel and z (m) in the camera's frame. Ignored if z is not positive or
   // the pixel is outside the photograph.
   void add(float x, float y, float z);
-  // Returns true if the nearest point of the pixel's cell, or of one of its eight neighbors, is
-  // more than `gap_m` in front of the plane normal . (p - camera) = height_m; p is at the cell's
-  // center. The normal is in world axes and faces the camera. The pixel must be inside the
-  // photograph.
+  // Returns true if normal . (q - camera) > height_m + gap_m for the nearest point q of the pixel's
+  // cell, or of one of its eight neighbors; q is assumed on the ray through the cell's center. The
+  // plane normal . (q - camera) = height_m is that of a surface, with a normal in world axes
+  // towards the camera. The pixel must be inside the photograph.
   bool has_any_above(float x, float y, const Eigen::Vector3d& normal, double height_m,
                      double gap_m) const;
 

@@ -38,24 +38,24 @@ SubdivisionResult split_long_sides(
     TriangleMesh mesh, double max_side_m, std::uint64_t max_triangles,
     const NeedsCutting& needs_cutting = [](const TriangleMesh&, const Triangle&) { return true; });
 
-// Relative exposure of photographs and vignetting of the lens, estimated from common observations.
+// Relative exposure of photographs and vignetting of the lens, from points in several photographs.
 // Colors are divided by exposure and vignetting before they are blended.
 
 struct TextureExposure {
   std::vector<Eigen::Vector3f> gains;  // per photograph and channel, relative to the geometric mean
-  std::array<double, 3> vignetting{0, 0, 0};  // ln(brightness): a r^2 + b r^4 + c r^6
+  std::array<double, 3> vignetting{0, 0, 0};  // a b c; ln(brightness) = a r^2 + b r^4 + c r^6
   std::size_t observations = 0;               // number of colors used
   // Standard deviation of ln(color) of one point between photographs, before and after correction.
   double log_color_deviation_before = 0.0;
   double log_color_deviation = 0.0;
 
-  // Divisor of the colors of `photo`, per channel; radius2 = r^2 as in ColorObservation.
+  // Divisor of the colors of `photo`, per channel; radius2 = r^2, with r = 1 at the image corners.
   Eigen::Vector3f factor(std::size_t photo, double radius2) const;
 };
 
 struct ExposureOptions {
   bool gains = true;       // estimate one gain per photograph and channel
-  bool vignetting = true;  // estimate vignetting, common to all
+  bool vignetting = true;  // estimate vignetting, equal in all photographs
 };
 
 // Estimates exposure by least squares over all vertices seen in several photographs (Brown and Lowe
@@ -77,7 +77,7 @@ TextureExposure estimate_exposure(std::span<const ColorObservation> observations
 constexpr std::uint32_t no_photo = 0xffffffff;
 
 struct LabelingOptions {
-  // >= 0: cost of 1 m of seam, as the area (m2) at half of the best quality that costs the same.
+  // >= 0: 1 m of seam costs as much as showing this area (m2) at half of the best quality.
   double seam_cost_m = 0.1;
 };
 

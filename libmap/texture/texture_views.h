@@ -14,7 +14,7 @@
 namespace libmap {
 
 struct TextureViewOptions {
-  double max_incidence_deg = 85.0;  // > 0, < 90: maximum angle between ray and normal
+  double max_incidence_deg = 85.0;  // > 0, < 90: maximum angle between line of sight and normal
   // >= 0: a photograph is not used for triangles whose center has a larger z in its camera frame.
   // The default is the maximum depth of fusion. 0: no limit.
   double max_depth_m = 4.0;
@@ -27,8 +27,8 @@ struct TextureViewOptions {
 
 struct ViewQuality {
   std::uint32_t photo = 0;  // index of the photograph
-  // Pixels per square meter of the surface, times factors <= 1 for slant and the photograph's
-  // border, and the photograph's sharpness.
+  // Pixels per square meter of the surface, times the sharpness of the photograph, times factors
+  // <= 1 for slant and for nearness to the photograph's border.
   float quality = 0.0F;
 };
 
@@ -70,7 +70,7 @@ struct TextureViewRequest {
   // Maximum number of views; both 0: no views, which takes much less time.
   std::size_t views_per_triangle = 0;
   std::size_t views_per_vertex = 0;
-  std::size_t observed_vertices = 0;  // approximate number (at most twice as many); 0: none
+  std::size_t observed_vertices = 0;  // requested number (up to twice as many are found); 0: none
 };
 
 struct TextureViews {
@@ -87,10 +87,10 @@ struct TextureViews {
 // Sets radius2 and color of all observations. Decodes each photograph once.
 void look_up_colors(const TexturePhotos& photos, std::vector<ColorObservation>& observations);
 
-// Finds the views of triangles and vertices. Corners of a triangle must be inside the photograph
-// and not occluded (one ray each, Embree), nor may the center be if a side is longer than 6 pixels.
-// The mesh must not be empty; triangles larger than a photograph have no view. The result is the
-// same for any number of threads.
+// Finds the views of triangles and vertices. The corners of a triangle, and its center if a side is
+// longer than 6 pixels, must be inside the photograph and not occluded (one ray each, Embree). The
+// mesh must not be empty; triangles larger than a photograph have no view. The result is the same
+// for any number of threads.
 TextureViews find_texture_views(const TriangleMesh& mesh, const TexturePhotos& photos,
                                 const TextureViewOptions& options,
                                 const TextureViewRequest& request, Progress& progress);

@@ -50,7 +50,7 @@ void require_textured_format(const std::filesystem::path& path);
 // Returns true if the extension is .obj or .glb.
 bool is_textured_format(const std::filesystem::path& path);
 
-// Reads an .obj or .glb from any program with textures (PNG or JPEG, embedded or in separate
+// Reads an .obj or .glb of any program, and its textures (PNG or JPEG, embedded or in separate
 // files). The result has no pages if the file has no textures. Corners of equal position and normal
 // are merged into one vertex. Throws Error naming the file if it cannot be read or parsed, contains
 // no triangle, or references an unreadable image.

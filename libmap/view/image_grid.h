@@ -60,7 +60,7 @@ struct SheetLayout {
 SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const ImageGridOptions& options,
                        const std::vector<Legend>& legends, double aspect);
 
-// Draws the sheet. Continuous color scales with the same title share one range, which covers the
+// Draws the sheet. Continuous legends with equal title and scale share one range, which covers the
 // ranges of all scenes. Throws Error as plan_sheet, render_scene and the cells' `scene` do.
 ColorImage draw_sheet(const std::vector<SheetCell>& cells, const ImageGridOptions& options);
 

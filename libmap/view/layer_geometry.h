@@ -41,7 +41,7 @@ struct PointSpacing {
   // Pitch of the lattice, else the median distance of nearest neighbors; 0 if all points coincide.
   double distance_m = 0.0;
   bool lattice = false;  // the points are on a lattice along the axes
-  bool gaps = false;     // surface cells of the lattice are empty; true without a lattice
+  bool gaps = false;     // over 15 % of points have fewer than 8 neighbors; true without a lattice
 };
 // Estimates the spacing, and whether the points are on a lattice along the axes.
 PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions);
@@ -57,7 +57,7 @@ struct ColoredTriangles {
 // Returns the triangles of a layer: a mesh unchanged, a cloud as squares or visible sides of cubes,
 // at least 1.3 pixels wide. With filler_size_m, each point also has a filler, a larger square
 // behind the point as seen from the camera, which fills gaps with the color of a neighboring point.
-// In top views, fillers are below the whole layer, so that each column shows its highest point. In
+// In top views, fillers are below the whole layer, so that they do not cover any of its points. In
 // other views, fillers cover only surfaces far behind the points.
 ColoredTriangles triangles_of(const PreparedLayer& layer, const SceneCamera& camera,
                               const Eigen::Vector3d& origin);

@@ -60,7 +60,7 @@ std::vector<PixelRect> place_labels(const std::vector<LabelRequest>& requests,
 
 // Draws markers in the terrain frame. Labels are omitted if the plot is too small for all labels.
 // With more than 5000 markers, only labeled markers and one other marker per verdict and square of
-// the image (side: radius of a disc) are drawn.
+// the image (side: a marker's radius) are drawn.
 void draw_markers(const ScenePage& page, const SceneCamera& camera,
                   const std::vector<Marker>& markers, Canvas& canvas);
 

@@ -43,7 +43,7 @@ libmap::ColorImage draw_score_change(const MapImage& image, const libgtd::MapCha
                                      const libgtd::VoxelMap& other);
 
 struct MapTableOptions {
-  std::string expected;                         // CSV of ExpectedMap; empty: no expectations
+  std::string expected;                         // CSV of regions with expected result; empty: none
   PointFrame points_frame = PointFrame::input;  // frame of `expected`
   std::string cutoff = "auto";  // minimum score of a graspable voxel; auto: each map's threshold
   std::string names;            // names of the maps, separated by '|'; empty: names of the files
@@ -57,7 +57,7 @@ struct MapTableOptions {
 void bind(libmap::ParameterTable& table, MapTableOptions& options);
 
 // Writes maps.csv, histograms.csv with a chart and, if requested, pairs.csv, regions.csv and charts
-// of graspable_share, voxel_youden and place_youden against the varied parameter into `folder`.
+// of maps.csv (graspable_share, voxel_youden and place_youden by the varied column) into `folder`.
 // Throws Error naming the file if a map or table is invalid.
 void tabulate_maps(const std::vector<std::string>& map_files, const std::string& folder,
                    const MapTableOptions& options, Run& run);

@@ -31,8 +31,8 @@ class GroundTiles {
   };
   using MakeGround = std::function<libgtd::Ground(const libmap::TriangleMesh& mesh)>;
 
-  // `mesh`: a file or a folder of tiles. start_height_m: as in ClosingOptions. `gripper` must
-  // outlive the object. Throws Error naming a file that cannot be read.
+  // `mesh`: a file or a folder of tiles. `start_height_m`: height above a location at which the
+  // approach starts. `gripper` must outlive the object. Throws Error naming an unreadable file.
   GroundTiles(const std::string& mesh, const libgtd::Gripper& gripper, double start_height_m,
               MakeGround make_ground);
 
@@ -60,9 +60,9 @@ class GroundTiles {
 
 struct GraspMapInput {
   std::string mesh_file;
-  std::string map_file;  // map in one file, or a tile store
-  std::string output;    // map in one file, or a tile store
-  libmap::TileShare share;
+  std::string map_file;         // map in one file, or a tile store
+  std::string output;           // map in one file, or a tile store
+  libmap::TileShare share;      // tiles that this run processes
   std::string parameters_hash;  // hash of gripper and options
 };
 

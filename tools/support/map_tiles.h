@@ -29,7 +29,7 @@ std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest)
 void write_tile(const std::filesystem::path& store, const libmap::PointCloud& points,
                 libgtd::StoredTile& tile);
 
-// Throws Error if a store has an index. For a store without a plan, which cannot be resumed.
+// For a store without a plan, which cannot be resumed: throws Error if the store has an index.
 void require_no_index(const libgtd::MapTileStore& store);
 
 class MapTiles {

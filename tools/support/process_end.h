@@ -14,7 +14,7 @@ namespace graspmap_tools {
 // (failed) if no pipe can be created.
 void end_cleanly_on_signals();
 
-// If one of these signals was received, waits for the end of the process, and reports no errors.
+// If SIGHUP, SIGINT or SIGTERM was received, waits for the end of the process. Reports no errors.
 void exit_if_signaled();
 
 // Flushes standard output. Throws Error (failed) if not all of it was written.

@@ -32,8 +32,8 @@ struct CalibrationOption {
 };
 void add_calibration_option(Command& command, CalibrationOption& calibration);
 
-// Returns the camera that the option selects, and prints the findings of its calibration; nullopt
-// for the stored camera. Throws Error if the file cannot be read.
+// Returns the camera that the option selects; nullopt for the stored camera. Prints the sensor
+// errors that its calibration corrects. Throws Error if the file cannot be read.
 std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibration,
                                                const std::string& scan, const PosesOption& poses,
                                                Run& run);

@@ -1,4 +1,4 @@
-// Entry points of usages of a command (comment) in separate source files. argv[0] is the command.
+// Entry points of commands with several usages; comments show the usage. argv[0] is the command.
 #pragma once
 
 #include <string>
