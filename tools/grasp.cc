@@ -363,8 +363,9 @@ int main(int argc, char** argv) {
       "tilt_deg, azimuth_deg of the pull; force_n at slip, or load_n and held (0 or 1)");
   command.option("--plan", "N", options.plan,
                  "with --points: number of most informative pull tests to plan");
-  command.option("--tile", "K/N", options.tile,
-                 "with --map: test only share K of N (1/N) of the tiles, into a tile store");
+  command.option(
+      "--tile", "K/N", options.tile,
+      "with --map and a tile store as output: test only share K of N (1/N) of the tiles");
   command.option("--scenes", "FOLDER", options.scenes.folder,
                  "output folder for one mesh per location, which shows the trial with the median "
                  "force; file name: column 'place' of LOCATIONS.csv, or the row number");

@@ -29,7 +29,7 @@ struct EngagementOptions {
 void bind(libmap::ParameterTable& table, EngagementOptions& options);
 
 // Distribution of a contact's force over the spines of the contact. best: the distribution with the
-// largest force. equally: equal parts; if spines slip, the spines on steeper facets bear all.
+// largest force. equally: equal parts; spines on flatter facets may slip and then bear nothing.
 enum class SpineSharing { best, equally };
 
 // Convex set of forces that a contact can exert on the gripper; it contains the zero force. A spine
@@ -93,7 +93,7 @@ class BearingContact {
 };
 
 // Draws at random which spines of a closed gripper's contacts engage, and with which facets. Skips
-// spine contacts of which no spine engages. Law adhesion is not random. Requires `fingers`.
+// spine contacts of which no spine engages. Law adhesion is not random. `gripper` needs `fingers`.
 std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contacts,
                                          const Gripper& gripper, const EngagementOptions& options,
                                          libmap::RandomStream& random);

@@ -51,8 +51,8 @@ GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptio
   const libmap::ScalarField* expected = field_of(mesh.vertex_fields, "expected_error");
   if (expected == nullptr)
     throw libmap::Error(
-        "the mesh has no such vertex field; use a mesh of graspmap mesh from a cloud of graspmap "
-        "fuse, or set surface_error to a number",
+        "the mesh has no such vertex field; set surface_error to a number, or mesh a cloud of "
+        "`graspmap fuse` with `graspmap mesh`",
         {.field = "expected_error"});
   for (std::size_t n = 0; n < expected->values.size(); ++n)
     if (expected->values[n] < 0.0)

@@ -14,7 +14,7 @@ namespace libgtd {
 
 // Part of the scene, stored in the vertex field `scene_part`. engaged, link: contact of spines or
 // of a link that bears a force. idle: finger that bears no force. cone: forces that a contact can
-// bear on its steepest facet. pull: arrow of the minimum holding force. load: arrow of the load.
+// bear on its steepest facet. pull: largest pull in the weakest direction. load: arrow of the load.
 enum class ScenePart { ground, gripper, engaged, link, idle, cone, pull, load };
 
 struct ScenePartStyle {

@@ -40,9 +40,9 @@ void bind(libmap::ParameterTable& table, Engagement& engagement) {
   table.add("engagement.friction", engagement.friction, libmap::not_negative,
             "coefficient of Coulomb friction of spines and links on the ground");
   table.add("engagement.asperity_min_deg", engagement.asperity_min_deg, angle_range,
-            "minimum inclination of an asperity's facet to the ground, against the drag, degrees");
+            "minimum slope of asperities' facets, which face the dragged spine, degrees");
   table.add("engagement.asperity_max_deg", engagement.asperity_max_deg, angle_range,
-            "maximum inclination of an asperity's facet to the ground, against the drag, degrees");
+            "maximum slope of asperities' facets, which face the dragged spine, degrees");
   table.add("engagement.engagement_rate", engagement.engagement_rate, libmap::not_negative,
             "mean number of facets that a spine meets per mm of drag, 1/mm");
   table.add("engagement.drag_mm", engagement.drag_mm, libmap::not_negative,

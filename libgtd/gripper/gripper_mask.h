@@ -63,7 +63,7 @@ struct GripperMask {
   bool is_counted(int x, int y, int z) const { return counted[index(x, y, z)] != 0; }
 };
 
-// Makes a mask. Throws Error for a value out of range, calibrated without `fingers`, and voxel
+// Makes a mask. Throws Error for a value out of range, missing `fingers` (calibrated), and voxel
 // sizes that give fewer than two solid layers, a side below 3 voxels or more than 2^28 voxels.
 GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& options);
 

@@ -29,9 +29,9 @@ class PointGrid {
   // Returns the cell of a position for which reaches() is true.
   Cell cell_of(const Eigen::Vector3d& position) const;
 
-  // Indices of the points, sorted by cell, then by index. The points of a cell are first..last - 1.
+  // Indices of the points, sorted by cell, then by index.
   const std::vector<std::uint32_t>& order() const { return order_; }
-  struct Range {
+  struct Range {  // order()[first] to order()[last - 1]
     std::uint32_t first = 0;
     std::uint32_t last = 0;
   };

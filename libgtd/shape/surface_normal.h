@@ -11,8 +11,8 @@ namespace libgtd {
 
 struct SurfaceNormalOptions {
   double radius_m = 0.07;  // radius of the ball of points for the plane fit
-  // Direction from which slopes are measured. Also replaces the outside direction of a position in
-  // fit_surface_normals that is missing, zero, not finite or parallel to the surface.
+  // Direction from which slopes are measured; also the outside direction of positions without a
+  // usable one (fit_surface_normals).
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
 };
 

@@ -25,7 +25,7 @@ void bind(ParameterTable& table, SensorModel& model) {
   table.add("near_m", model.near_m, not_negative, "minimum useful depth, m");
   table.add("far_m", model.far_m, positive, "maximum useful depth, m");
   table.add("depth_delay_s", model.depth_delay_s, any_number,
-            "delay of the depth image after the middle row of the color image, s");
+            "time from the color image's middle row to the depth image, s");
   table.add("rolling_shutter_s", model.rolling_shutter_s, not_negative,
             "time from the first to the last row of the color image, s");
   table.add("refine.frame_time_s", model.frame_time_s, positive, "time between two frames, s");

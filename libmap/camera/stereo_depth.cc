@@ -94,7 +94,7 @@ void bind(ParameterTable& table, StereoDepthOptions& options) {
             "range of disparities, pixels; minimum depth: fx * baseline / (min_disparity + range)");
   table.add("block_px", options.block_px, Range{1, 31}, "side of the matched window, odd, pixels");
   table.add("uniqueness_percent", options.uniqueness_percent, Range{0, 100},
-            "minimum difference between the costs of best and second-best match, percent");
+            "minimum difference between the costs of best and second-best match, % of the latter");
   table.add(
       "left_right_px", options.left_right_px, Range{-1, 1024},
       "maximum difference between the disparities of the left-right check, pixels; -1: disabled");

@@ -1,6 +1,6 @@
 // Compiles a file of inner loops once per instruction set. Before including this header, define
 // GRASPMAP_LOOPS as the path of that file. The file defines functions and, at its end, the table
-// `all` of these functions; in it, GRASPMAP_REGISTER is the size of the vector registers in bytes.
+// `all` of these functions. It can use GRASPMAP_REGISTER, the vector registers' size in bytes.
 // Include this header in an anonymous namespace of a source that is not part of a unity build. The
 // file must not use inline functions of other sources: the linker could keep only their AVX code.
 

@@ -24,7 +24,7 @@ class FeatureCache {
   explicit FeatureCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   bool enabled() const { return !folder_.empty(); }
-  // Reads features, descriptors and surfaces into `frame`, whose `type` must be set;
+  // Reads features, descriptors and surfaces into `frame` (frame.type: set before);
   // `depth_cameras` has one camera per surface. Returns false and leaves `frame` unchanged if there
   // is no valid file for `key`.
   bool read(const std::string& key, const std::vector<Camera>& depth_cameras,

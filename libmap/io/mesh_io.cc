@@ -58,7 +58,7 @@ std::uint64_t index_of(const TextLine& line, std::size_t word, std::uint64_t lim
   if (!index || *index < 0 || static_cast<std::uint64_t>(*index) >= limit)
     throw Error("not in range", {.field = name_of(line),
                                  .value = "'" + std::string(line.words[word].substr(0, 40)) + "'",
-                                 .bound = "0 to " + std::to_string(limit) + " - 1"});
+                                 .bound = ">= 0 and < " + std::to_string(limit)});
   return static_cast<std::uint64_t>(*index);
 }
 

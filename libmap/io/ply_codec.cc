@@ -297,7 +297,7 @@ void add_fan(const std::vector<double>& corners, std::uint64_t face, std::uint64
         corner > std::numeric_limits<std::uint32_t>::max())
       throw Error("not a vertex index", {.field = name,
                                          .value = to_text(corner),
-                                         .bound = "0 to " + std::to_string(vertices) + " - 1"});
+                                         .bound = ">= 0 and < " + std::to_string(vertices)});
   for (std::size_t i = 2; i < corners.size(); ++i) {
     content.triangles.push_back({static_cast<std::uint32_t>(corners[0]),
                                  static_cast<std::uint32_t>(corners[i - 1]),

@@ -20,7 +20,7 @@ std::vector<FramePair> linked_pairs(const std::vector<FrameFeatures>& frames,
 
 // Returns pairs of each frame with the `pairs_per_frame` frames of the same component whose
 // surfaces have the largest overlap (share >= `min_overlap`), in ascending order, smaller index
-// first. Only the 24 nearest frames by distance (<= 2.5 m) and rotation (<= 100 deg) are compared.
+// first. Compares only the 24 nearest frames by distance / 2.5 m + rotation / 100 deg, each <= 1.
 std::vector<FramePair> overlapping_pairs(const std::vector<FrameFeatures>& frames,
                                          const std::map<int, Pose>& map_from_base,
                                          const std::vector<GraphComponent>& components,

@@ -1,6 +1,6 @@
-// Adjusts poses, motions and camera parameters in one dense system. Points are optimized at given
-// poses and cameras and eliminated from the normal equations (Schur complement). Private to
-// libmap/optimize.
+// Adjusts poses, velocities (`motions`) and camera parameters in one dense system. Points are
+// optimized at given poses and cameras and eliminated from the normal equations (Schur complement).
+// Private to libmap/optimize.
 #pragma once
 
 #include <Eigen/Cholesky>

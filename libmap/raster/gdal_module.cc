@@ -145,8 +145,7 @@ class Dem {
     if (type == GDT_Byte || GDALDataTypeIsComplex(type) != 0 ||
         GDALGetRasterColorTable(band_) != nullptr)
       throw Error(
-          "not a type of heights; convert a height band to another type (gdal_translate -ot "
-          "Float32)",
+          "not a type of heights; if these are heights, convert them (gdal_translate -ot Float32)",
           {.field = "type of band " + std::to_string(chosen),
            .value = info_.band_type,
            .bound = "integers of 16 bits or more, or floating point"});

@@ -368,7 +368,7 @@ std::map<int, Matrix6d> covariances(const RefinementInput& input, const Refineme
   return of_nodes;
 }
 
-// Drops components without links to the largest one, because their poses are undetermined.
+// Drops the nodes of unjoined(): their poses relative to the others are undetermined.
 void drop_unjoined(const RefinementInput& input, const RefinementState& state,
                    RefinementResult& result) {
   std::vector<std::vector<int>> parts;

@@ -39,7 +39,7 @@ struct ReportTable {
 struct ReportMap {
   MapView view{};
   std::optional<ReportTable> locations{};  // table of look-ups; row n has marker n of the view
-  std::optional<ReportImage> preview{};    // image that is shown without a 3-D view
+  std::optional<ReportImage> preview{};    // shown if no 3-D view is, e.g. without JavaScript
 };
 
 // A colored mesh, and the meaning of its colors.

@@ -20,7 +20,7 @@ struct ColmapBuilderOptions {
 };
 void bind(ParameterTable& table, ColmapBuilderOptions& options);
 
-// An image observes each earlier point whose depth it measures at the point's projection, so that
+// An image observes each earlier point that agrees with its depth at the projection, so that
 // reprojection errors are 0 by construction (stored as -1, unknown). It adds a point at the center
 // of each grid cell in which it observes no point, if it has depth there and no depth edge. Images
 // of cameras with equal intrinsics share a COLMAP camera.

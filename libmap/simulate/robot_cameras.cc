@@ -60,12 +60,13 @@ DepthSensorOptions sensor_of(const RigCamera& camera, DepthSensorOptions depth,
 }  // namespace
 
 void bind(ParameterTable& table, RobotCamerasOptions& options) {
-  table.add("sensor", options.sensor,
-            "depth camera that limits the rig's range and sets the noise if no noise option does: "
-            "a name in data/sensors or a file; auto: range of the rig, no noise");
+  table.add(
+      "sensor", options.sensor,
+      "depth camera (name in data/sensors, or file): limits the rig's range and, without noise "
+      "options, sets the noise; auto: neither");
   bind_noise(table, options.depth);
   bind(table, options.faults);
-  table.add("stamp_s", options.stamp_s, not_negative, "earliest possible stamp of the images, s");
+  table.add("stamp_s", options.stamp_s, not_negative, "start of the interval of random stamps, s");
   table.add("stamp_spread_s", options.stamp_spread_s, not_negative,
             "maximum difference between the stamps of the cameras, s");
   table.add("seed", options.seed, not_negative, "random seed of noise and stamps");

@@ -223,9 +223,9 @@ void bind(ParameterTable& table, CalibrationFaults& faults) {
   table.add("depth_baseline_mm", faults.depth_baseline_mm, any_number,
             "distance of the depth camera to the right of the color camera, mm");
   table.add("depth_width_px", faults.depth_width_px, {0, 16384},
-            "width of depth images with the field of view of color, pixels; 0: width of color");
+            "width of depth images (field of view as color), pixels; 0: width of color");
   table.add("depth_height_px", faults.depth_height_px, {0, 16384},
-            "height of depth images with the field of view of color, pixels; 0: height of color");
+            "height of depth images (field of view as color), pixels; 0: height of color");
   table.add("depth_delay_s", faults.depth_delay_s, any_number,
             "fault: delay of each depth image after the color image, s");
   table.add("rolling_shutter_s", faults.rolling_shutter_s, not_negative,

@@ -17,7 +17,7 @@ namespace libmap {
 void bind(ParameterTable& table, EdgeCheckOptions& options) {
   table.add_former_key("places", "positions_per_edge");
   table.add("positions_per_edge", options.positions_per_edge, {1.0, 10000.0},
-            "number of measured positions along each edge of the site");
+            "number of height comparisons along each edge of the site");
   table.add("inset_m", options.inset_m, not_negative,
             "distance from the site's edge, inwards, at which heights are compared, m");
 }

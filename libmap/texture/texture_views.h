@@ -77,7 +77,7 @@ struct TextureViews {
   // One row per triangle: photographs that see it completely.
   ViewTable of_triangles;
   // One row per vertex up to the last vertex of the requested triangles: photographs that see all
-  // triangles of the vertex, with the minimum quality. Rows of other vertices are empty.
+  // triangles of the vertex, (quality: that of the worst). Rows of other vertices are empty.
   ViewTable of_vertices;
   // All views of a subset of vertices, spread over the requested triangles, without colors.
   std::vector<ColorObservation> observations;

@@ -24,7 +24,7 @@ void check_whole(const char* field, int value, int low, int high) {
 }
 
 void check(const std::vector<SheetCell>& cells, const ImageGridOptions& options) {
-  if (cells.empty()) throw Error("there are none; give at least one image", {.field = "cells"});
+  if (cells.empty()) throw no_elements("images of the sheet");
   check_whole("columns", options.columns, 0, 1000);
   check_whole("cell_width_px", options.cell_width_px, 16, max_side_px);
   if (options.cell_height_px != 0)

@@ -11,7 +11,7 @@ const graspmap_python::Stage& stage_of(const std::string& name) {
     if (stage.name == name) return stage;
     names.push_back(stage.name);
   }
-  throw libmap::Error("no stage with options has this name" + libmap::did_you_mean(name, names),
+  throw libmap::Error("no stage of this name has options" + libmap::did_you_mean(name, names),
                       {.field = "stage", .value = name, .bound = graspmap_python::one_of(names)});
 }
 

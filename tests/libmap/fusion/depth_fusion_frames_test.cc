@@ -196,7 +196,7 @@ TEST(DepthFusionFrames, NothingToFuse) {
   EXPECT_TRUE(is_error(error_of([&] { fuse_depth(scan, {}); }), {.field = "poses"}));
   scan.frames[1].depth = {};
   scan.frames[2].depth = {};
-  EXPECT_TRUE(is_error(error_of([&] { fuse_depth(scan, scan.poses); }), {.about = "2 frames"}));
+  EXPECT_TRUE(is_error(error_of([&] { fuse_depth(scan, scan.poses); }), {.field = "frames"}));
   for (auto& [node, frame] : scan.frames) frame.depth = DepthImage(128, 96, 0.0F);
   const DepthFusionResult result = fuse_depth(scan, scan.poses);
   EXPECT_TRUE(result.cloud.empty());

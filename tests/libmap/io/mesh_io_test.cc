@@ -261,9 +261,9 @@ TEST(MeshFiles, BrokenPlyFaces) {
   };
   EXPECT_EQ(read_as(".ply", mesh("3 0 1 2")).mesh.triangles.size(), 1U);
   EXPECT_TRUE(is_error(error_as(".ply", mesh("3 0 1 3")),
-                       {.field = "face 0", .value = "3", .bound = "0 to 3 - 1"}));
+                       {.field = "face 0", .value = "3", .bound = ">= 0 and < 3"}));
   EXPECT_TRUE(is_error(error_as(".ply", mesh("3 0 1 -1")),
-                       {.field = "face 0", .value = "-1", .bound = "0 to 3 - 1"}));
+                       {.field = "face 0", .value = "-1", .bound = ">= 0 and < 3"}));
   EXPECT_TRUE(is_error(error_as(".ply", mesh("2 0 1")),
                        {.field = "face 0", .value = "2", .bound = ">= 3"}));
   EXPECT_TRUE(

@@ -81,7 +81,7 @@ TEST(PcdFiles, NumbersMayLieAnywhere) {
     }
     for (const std::size_t missing : {1u, 4u, 12u, 21u, 22u, 63u})
       EXPECT_TRUE(is_error(error_as(".pcd", bytes.substr(0, bytes.size() - missing)),
-                           {.about = std::to_string(data.size() - missing) + " bytes"}));
+                           {.field = "number of points", .value = "3"}));
   }
 }
 
@@ -113,13 +113,13 @@ TEST(PcdFiles, CompressedPaddingMayBeLeftOut) {
 
 TEST(PcdFiles, HeadersThatLie) {
   const std::string ten(10 * 12, '\1');
-  EXPECT_TRUE(
-      is_error(error_as(".pcd", pcd_header("11", "binary") + ten), {.about = "declares 11"}));
+  EXPECT_TRUE(is_error(error_as(".pcd", pcd_header("11", "binary") + ten),
+                       {.field = "number of points", .value = "11", .bound = "<= 10"}));
   EXPECT_TRUE(is_error(error_as(".pcd", pcd_header("3", "ascii") + "1 2 3\n4 5 6\n7777777 8\n"),
-                       {.about = "instead of 3"}));
+                       {.field = "numbers of line 14", .value = "2", .bound = "3"}));
   EXPECT_TRUE(
       is_error(error_as(".pcd", pcd_header("3", "ascii") + "1.25 2.25 3.25\n4.25 5.25 6.25\n"),
-               {.about = "2 lines"}));
+               {.field = "number of points", .value = "3", .bound = "<= 2"}));
   EXPECT_TRUE(is_error(error_as(".pcd", pcd_header("1", "ascii") + "1 2 three\n"),
                        {.field = "z", .value = "three"}));
   for (const char* const points : {"9223372036854775807", "4611686018427387904", "1000000000000"})
@@ -143,8 +143,12 @@ TEST(PcdFiles, CompressedSizesThatLie) {
   const auto sizes = [](std::uint32_t compressed, std::uint32_t uncompressed) {
     return raw(compressed) + raw(uncompressed);
   };
-  EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(1000, 120) + "abc"), {.about = "of 1000"}));
-  EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(3, 119) + "abc"), {.about = "contain 119"}));
+  EXPECT_TRUE(
+      is_error(error_as(".pcd", header + sizes(1000, 120) + "abc"),
+               {.field = "bytes of the compressed data", .value = "1000", .bound = "<= 3"}));
+  EXPECT_TRUE(
+      is_error(error_as(".pcd", header + sizes(3, 119) + "abc"),
+               {.field = "bytes of the uncompressed data", .value = "119", .bound = "10 * 12"}));
   EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(0, 120)), {.field = "compressed data"}));
   EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(3, 120) + "\xff\xff\xff"),
                        {.field = "compressed data"}));

@@ -64,7 +64,7 @@ TEST(PlyFiles, ListsInBinary) {
 TEST(PlyFiles, HeadersThatLie) {
   EXPECT_TRUE(
       is_error(error_as(".ply", ply_header("binary_little_endian", "11") + std::string(120, '\1')),
-               {.about = "11 rows"}));
+               {.field = "number of rows of 'vertex'", .value = "11", .bound = "<= 10"}));
   EXPECT_TRUE(is_error(error_as(".ply", ply_header("ascii", "3") + "1.5 2.5 3.5\n1.5 2.5 3.5\n"),
                        {.about = "row 2"}));
   EXPECT_TRUE(

@@ -125,7 +125,8 @@ TEST(SceneYaml, documents_of_another_form_are_errors) {
   for (const std::string text : {"", "shapes", "[]", "\xff\xfe"})
     EXPECT_TRUE(is_error(message_of(text), {.file = "scene.yaml", .about = "'shapes'"})) << text;
   EXPECT_TRUE(is_error(message_of("shapes: &a [*a]"), {.file = "scene.yaml", .about = "500000"}));
-  EXPECT_TRUE(is_error(message_of("? [1]\n: 2"), {.file = "scene.yaml", .field = "key"}));
+  EXPECT_TRUE(
+      is_error(message_of("? [1]\n: 2"), {.file = "scene.yaml", .field = "key of a mapping"}));
   EXPECT_TRUE(
       is_error(message_of(std::string(100'000, '[')), {.file = "scene.yaml", .field = "line 1"}));
   EXPECT_TRUE(is_error(message_of("shapes:\n  - {shape: sphere\n"),

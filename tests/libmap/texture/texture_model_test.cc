@@ -344,7 +344,7 @@ TEST(TextureModel, FramesThatCannotBeUsed) {
   EXPECT_EQ(result.skipped[0].first, 2);
   EXPECT_TRUE(is_error(result.skipped[0].second, {.file = "painted", .field = "node 2"}));
   EXPECT_EQ(result.skipped[0].second.context().file, "painted");
-  EXPECT_TRUE(is_error(result.skipped[1].second, {.about = "node 3"}));
+  EXPECT_TRUE(is_error(result.skipped[1].second, {.field = "node 3"}));
   TextureOptions strict;
   strict.strict = true;
   EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(mesh, scan, poses, strict); }),

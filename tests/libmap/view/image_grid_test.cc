@@ -229,7 +229,7 @@ TEST_F(ImageGridTest, ADimensionLineIsDrawnAtItsEnds) {
 
 TEST(ImageGrid, WhatCannotBeDrawnIsAnError) {
   const std::vector<SheetCell> one = {cell_of("", ColorImage(10, 10, red))};
-  EXPECT_TRUE(is_error(error_of([] { draw_sheet({}, {}); }), {.field = "cells"}));
+  EXPECT_TRUE(is_error(error_of([] { draw_sheet({}, {}); }), {.field = "images of the sheet"}));
   ImageGridOptions options;
   options.cell_width_px = 3;
   EXPECT_TRUE(is_error(error_of([&] { draw_sheet(one, options); }),

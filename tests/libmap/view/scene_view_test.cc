@@ -305,13 +305,14 @@ TEST_F(SceneViewTest, DegenerateScenesAreDrawnOrRefused) {
        {Viewpoint::top, Viewpoint::oblique, Viewpoint::front, Viewpoint::side})
     EXPECT_EQ(render_scene(lone, bare(100, 100, view)).at(50, 50), red);
   Scene empty;
-  EXPECT_TRUE(is_error(error_of([&] { render_scene(empty, {}); }), {.field = "points"}));
+  EXPECT_TRUE(is_error(error_of([&] { render_scene(empty, {}); }), {.field = "points to draw"}));
   empty.layers.emplace_back();
-  EXPECT_TRUE(is_error(error_of([&] { render_scene(empty, {}); }), {.field = "points"}));
+  EXPECT_TRUE(is_error(error_of([&] { render_scene(empty, {}); }), {.field = "points to draw"}));
   Scene no_numbers;
   no_numbers.layers.push_back(
       colored_points({{0, std::numeric_limits<double>::quiet_NaN(), 0}}, {red}, 0.0));
-  EXPECT_TRUE(is_error(error_of([&] { render_scene(no_numbers, {}); }), {.field = "points"}));
+  EXPECT_TRUE(
+      is_error(error_of([&] { render_scene(no_numbers, {}); }), {.field = "points to draw"}));
   Scene torn = lone;
   std::get<PointCloud>(torn.layers[0].shape).colors.push_back(red);
   EXPECT_TRUE(is_error(error_of([&] { render_scene(torn, {}); }),
