@@ -78,10 +78,10 @@ void refuse_mesh(const std::string& terrain) {
 
 // Throws Error if there are no points; warns about dropped points.
 void require_points(std::size_t points, std::size_t dropped, const std::string& terrain, Run& run) {
+  if (points == 0 && dropped == 0) throw libmap::no_elements("points of the cloud", terrain);
   if (points == 0)
-    throw libmap::Error(dropped == 0 ? "the cloud has no points"
-                                     : fmt::format("none of its {} points has a position", dropped),
-                        {.file = terrain});
+    throw libmap::Error(fmt::format("none of {} has a position", dropped),
+                        {.file = terrain, .field = "points of the cloud"});
   if (dropped > 0)
     run.warn("{}: {} points without a position{} were dropped", terrain, dropped,
              is_dem(terrain) ? " (heights such as -9999, not declared as nodata)" : "");

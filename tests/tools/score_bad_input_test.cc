@@ -90,7 +90,8 @@ TEST_F(ScoreBadInput, AllPointsOnALine) {
 TEST_F(ScoreBadInput, AllNaN) {
   const double nan = std::nan("");
   cloud_of(std::vector<Eigen::Vector3d>(7, {nan, nan, nan}));
-  EXPECT_TRUE(bad_input(score({"cloud.pcd"}), {.file = "cloud.pcd", .about = "its 7"}));
+  EXPECT_TRUE(bad_input(score({"cloud.pcd"}),
+                        {.file = "cloud.pcd", .field = "points of the cloud", .about = "7"}));
 }
 
 TEST_F(ScoreBadInput, HeaderPromisesMoreThanFollows) {

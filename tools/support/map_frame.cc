@@ -16,8 +16,7 @@ PointFrameNames listed_point_frame_names() {
 
 std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table) {
   const std::size_t columns[] = {table.column("x"), table.column("y"), table.column("z")};
-  if (table.rows.empty())
-    throw libmap::Error("the table has no rows below its header", {.file = table.file});
+  if (table.rows.empty()) throw libmap::no_elements("rows below the header", table.file);
   std::vector<Eigen::Vector3d> positions;
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
     Eigen::Vector3d& position = positions.emplace_back();
