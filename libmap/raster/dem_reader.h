@@ -36,8 +36,8 @@ struct DemBlock {
   std::int64_t row = 0;     // first row
   std::int64_t columns = 0;
   std::int64_t rows = 0;
-  // Local heights, m. NaN: nodata. -infinity: undeclared nodata, i.e. -9999, -99999, -999999, -32767
-  // or -32768 in a file in meters that has neither scale nor offset.
+  // Local heights, m. NaN: nodata. -infinity: undeclared nodata, i.e. -9999, -99999, -999999,
+  // -32767 or -32768 in a file in meters that has neither scale nor offset.
   std::vector<double> heights_m;
 };
 
